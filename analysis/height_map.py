@@ -123,12 +123,15 @@ def _over_holes(cloud: Cloud, mesh: Delaunay, edges: Float) -> NDArray[np.bool_]
     return np.asarray(np.any((of == np.roll(of, 1, axis=1)) & (edges > HOLE * np.median(apart)), axis=1))
 
 
-def encoded(heights: Float) -> tuple[NDArray[np.uint16], float, float]:
+def encoded(heights: Float, limits: tuple[float, float] | None = None) -> tuple[NDArray[np.uint16], float, float]:
     """16-bit numbers, scale and offset: a height is offset + scale times its number, and 0 says that there is none.
 
-    The scale has three digits. InputError: there is no height at all.
+    limits: m, heights beyond which are left out, so that few of them do not take the levels from the others; None: all
+    are kept. The scale has three digits. InputError: there is no height at all, or none within the limits.
     """
     known = np.isfinite(heights)
+    if limits is not None:
+        known &= (heights >= limits[0]) & (heights <= limits[1])
     if not known.any():
         raise InputError("the height map has no cell with a height", cure="give a larger pitch")
     low, high = float(heights[known].min()), float(heights[known].max())

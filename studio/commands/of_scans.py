@@ -33,6 +33,7 @@ FOLDER = click.argument("folder", type=click.Path(path_type=Path))
 @click.command()
 @click.argument("source", type=click.Path(path_type=Path))
 @click.option("--pitch", type=FiniteRange(1e-3, 1e3), help="Of the cells, mm  [default: a cell for each point].")
+@click.option("--all-heights", is_flag=True, help="Keep those of stray points, which make the levels coarser.")
 @click.option("--out", type=click.Path(path_type=Path), help="PNG or TIFF  [default: heightmap.png beside the points].")
 @common
 def heightmap(source: Path, **options: Any) -> None:

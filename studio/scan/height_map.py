@@ -9,10 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.cloud import Cloud, merge, ply_pieces
+from analysis.deviation import false_points
 from analysis.height_map import HeightMap, encoded, height_map
 from analysis.report.units import digits
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import atomic_write
 from render.base.finite import known
@@ -23,6 +26,8 @@ from studio.scan.own_files import check_replaceable
 from studio.scan.scan_results import ScanResults
 
 FORMAT, VERSION = "blazer-heightmap", 1
+ENDS = (1.0, 99.0)
+"""Percentiles of heights, where no errors are known."""
 SUFFIXES = (".png", ".tif", ".tiff")
 NEEDED = ("x", "y", "z", "sigma_random", "correlation_length", "row", "laser", "step")
 SHADES = 1024
@@ -52,18 +57,29 @@ def points_of(source: Path) -> Path:
     return file
 
 
-def write_height_map(points: Path, path: Path, pitch: float | None = None) -> Written:
+def write_height_map(points: Path, path: Path, pitch: float | None = None, *, all_heights: bool = False) -> Written:
     """.png or .tif, by the suffix, and .json beside it; pitch: m, None as of `height_map`.
 
-    InputError: as `height_map` and `read_ply`, and as of `write_made`.
+    all_heights: also those beyond `file_range`, which make the levels coarser. InputError: as `height_map` and
+    `read_ply`, and as of `write_made`.
     """
     _check_suffix(path)
-    return write_made(read_map(points, pitch), path, points)
+    read = read_points(points)
+    return write_made(height_map(read, pitch), path, points, None if all_heights else file_range(read))
 
 
-def read_map(points: Path, pitch: float | None = None) -> HeightMap:
-    """Of the points of a PLY. InputError: as `height_map` and `read_ply`."""
-    return height_map(read_points(points), pitch)
+def file_range(points: Cloud) -> tuple[float, float] | None:
+    """m, from the lowest to the highest of the points that are not far off the surface, where their errors are known.
+
+    Else from percentile to percentile, and as much again on either side. None: nothing is to be left out.
+    """
+    heights, errors = points["z"], points.get("error_depth")
+    if errors is not None and np.isfinite(errors).any():
+        near = heights[~false_points(errors) & np.isfinite(heights)]
+        return (float(near.min()), float(near.max())) if len(near) else None
+    heights = heights[np.isfinite(heights)]
+    low, high = np.percentile(heights, ENDS).tolist() if len(heights) else (0.0, 0.0)
+    return (2.0 * low - high, 2.0 * high - low) if high > low else None
 
 
 def read_points(points: Path) -> Cloud:
@@ -83,15 +99,15 @@ def picture(made: HeightMap, scale: ColourScale, limits: tuple[float, float]) ->
     return mapped(above, 0.0, high - low, table, 0xFF000000 | red << 16 | green << 8 | blue)
 
 
-def write_made(made: HeightMap, path: Path, points: Path) -> Written:
-    """.png or .tif, by the suffix, and .json beside it; points: which it is of.
+def write_made(made: HeightMap, path: Path, points: Path, limits: tuple[float, float] | None = None) -> Written:
+    """.png or .tif, by the suffix, and .json beside it; points: which it is of; limits: as of `encoded`.
 
     InputError: the suffix is another, no cell has a height, or a file would replace one of other origin.
     """
     _check_suffix(path)
     beside = path.with_suffix(".json")
     check_replaceable([path, beside], [points])
-    return _written(made, path, beside, points)
+    return _written(made, path, beside, points, limits)
 
 
 def _check_suffix(path: Path) -> None:
@@ -102,10 +118,12 @@ def _check_suffix(path: Path) -> None:
         )
 
 
-def _written(made: HeightMap, path: Path, beside: Path, source: Path) -> Written:
+def _written(
+    made: HeightMap, path: Path, beside: Path, source: Path, limits: tuple[float, float] | None = None
+) -> Written:
     import cv2
 
-    numbers, scale, offset = encoded(made.heights)
+    numbers, scale, offset = encoded(made.heights, limits)
     done, data = cv2.imencode(path.suffix.lower(), numbers)
     if not done:
         raise InputError("the height map cannot be encoded", where=str(path))
@@ -125,6 +143,7 @@ def _written(made: HeightMap, path: Path, beside: Path, source: Path) -> Written
         "x_first": made.x,
         "y_first": made.y,
         "valid": int(np.count_nonzero(numbers)),
+        "left_out": _left_out(made.heights, numbers > 0),
         "points": made.points,
         "sigma": sigma_record(made, scale),
     }
@@ -133,6 +152,35 @@ def _written(made: HeightMap, path: Path, beside: Path, source: Path) -> Written
     with atomic_write(beside) as temporary:
         temporary.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return Written([path, beside], record)
+
+
+def _left_out(heights: Float, kept: NDArray[np.bool_]) -> dict[str, Any]:
+    """How many cells with a height the picture lacks, and from where to where heights are without and with them; m."""
+    there = np.isfinite(heights)
+    return {
+        "cells": int(np.count_nonzero(there & ~kept)),
+        "kept_from": float(heights[kept].min()),
+        "kept_to": float(heights[kept].max()),
+        "all_from": float(heights[there].min()),
+        "all_to": float(heights[there].max()),
+    }
+
+
+def left_out_sentence(left_out: dict[str, Any]) -> str:
+    """What `_left_out` says, for a person; empty where all heights are in the picture."""
+    if not left_out["cells"]:
+        return ""
+    kept, all_of = ([f"{1e3 * left_out[f'{name}_{end}']:.4g}" for end in ("from", "to")] for name in ("kept", "all"))
+    cells = "1 cell is" if left_out["cells"] == 1 else f"{left_out['cells']} cells are"
+    return (
+        f"{cells} left out, beyond {' to '.join(kept)} mm, as of stray points: with them heights go from "
+        f"{' to '.join(all_of)} mm."
+    )
+
+
+def left_out_of(beside: Path) -> str:
+    """As of `left_out_sentence`, of the file beside a picture that was just written."""
+    return left_out_sentence(json.loads(beside.read_text(encoding="utf-8"))["left_out"])
 
 
 def sigma_record(made: HeightMap, scale: float) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job, Progress, State
 from studio.runtime.preferences import PreferencesFile
 from studio.scan.film import export_film
-from studio.scan.height_map import export_height_map
+from studio.scan.height_map import export_height_map, left_out_of
 from studio.scan.logo import logo_remarks
 from studio.scan.own_files import check_replaceable
 from studio.scan.redevelop import Development, develop_again, development, measure_again
@@ -142,11 +142,15 @@ class ExportActions(QObject):
             what = shown if as_shown else _measured(shown, how, noise, cancelled)
             if kind == "height map":  # nobody was asked about the file beside the picture
                 check_replaceable([path.with_suffix(".json")])
-            return export.export_unless(cancelled, writer, path, what)
+            written = export.export_unless(cancelled, writer, path, what)
+            if kind == "height map":
+                left_out.extend(filter(None, [left_out_of(written[1])]))
+            return written
 
         notes = scale_notes(render.scanner_scale)
         if kind == "report":
             notes = (*notes, *logo_remarks(now, self.session.document.root))
+        left_out: list[str] = []
 
         def then(written: list[Path]) -> None:
             if kind == "report" and whole is None:
@@ -154,7 +158,7 @@ class ExportActions(QObject):
             method = (how.project if whole is None else scan_steps(self.session).measured_as(render)).extraction.method
             own = "the project's own method" if whole is None else "as the scan was measured last"
             said = f", the points by {method_name(method)}, {own}" if kind == "points" else ""
-            self._tell(written, said + (f", of {of}" if of else ""), notes)
+            self._tell(written, said + (f", of {of}" if of else ""), (*notes, *left_out))
 
         self._tell_wait(path)
         self._job = self.runner.run(LANE, f"export {path.name}", work, then)

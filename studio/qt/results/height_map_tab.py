@@ -11,6 +11,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QTimer
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
+    QCheckBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
@@ -38,9 +39,19 @@ from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job
 from studio.scan.colour_scale import PER_METRE, ColourScale
 from studio.scan.first_range import height_range
-from studio.scan.height_map import picture, points_of, read_points, sigma_record, sigma_sentence, write_made
+from studio.scan.height_map import (
+    file_range,
+    left_out_sentence,
+    picture,
+    points_of,
+    read_points,
+    sigma_record,
+    sigma_sentence,
+    write_made,
+)
 from studio.scan.scan_results import ScanResults
 
+Range = tuple[float, float] | None
 LANE = "height map"
 NOTHING = "A height map is of a scan: run one (F6, Motion), or open the results of one."
 FILES = "16 bit PNG (*.png);;16 bit TIFF (*.tif *.tiff)"
@@ -70,6 +81,10 @@ class HeightMapTab(QWidget):
         self.pitch.setAccessibleName("Cells")
         self.pitch.setSpecialValueText("as many cells as points")
         self.pitch.setToolTip("Width of a cell")
+        self._file_range: tuple[float, float] | None = None
+        """m, what a file has of the heights."""
+        self.all_heights = QCheckBox("All heights")
+        self.all_heights.setToolTip("Into the file also those of stray points, which make its levels coarser")
         self.export = text_button(
             "Export…", "16 bit, with scale, offset and the value of no height in a file beside it"
         )
@@ -103,6 +118,7 @@ class HeightMapTab(QWidget):
         self.pitch.refused.connect(partial(session.message.emit, "warning"))
         self.pitch.valueChanged.connect(lambda _: self._rest.start())
         self.export.clicked.connect(self._ask)
+        self.all_heights.toggled.connect(self._tell)
         self.bar.scaled.connect(self._rescale)
         self.bar.unit_chosen.connect(self._draw)
         self.line.sigRegionChanged.connect(self._show_profile)
@@ -141,13 +157,13 @@ class HeightMapTab(QWidget):
         folder, pitch = scan.found.folder, 1e-3 * self.pitch.value() or None
         self.told.setText("Making the height map…")
 
-        def work(progress: object, cancelled: object) -> tuple[HeightMap, tuple[float, float] | None]:
+        def work(progress: object, cancelled: object) -> tuple[HeightMap, Range, Range]:
             points = read_points(points_of(folder))
-            return height_map(points, pitch), height_range(points)
+            return height_map(points, pitch), height_range(points), file_range(points)
 
-        def then(made: tuple[HeightMap, tuple[float, float] | None]) -> None:
+        def then(made: tuple[HeightMap, Range, Range]) -> None:
             if scan is self._scan:
-                self._first = made[1]
+                self._first, self._file_range = made[1:]
                 self._take(made[0])
 
         self.runner.run(LANE, "height map", work, then)
@@ -156,17 +172,25 @@ class HeightMapTab(QWidget):
         """InputError: there is no map, or as of `write_made`."""
         if self.made is None or self._scan is None:
             raise InputError("there is no height map yet")
-        files = write_made(self.made, path, points_of(self._scan.found.folder)).paths
-        self.session.message.emit("info", f"Wrote {', '.join(str(file) for file in files)}")
+        written = write_made(self.made, path, points_of(self._scan.found.folder), self._limits())
+        left_out = left_out_sentence(written.record["left_out"])
+        text = f"Wrote {', '.join(str(file) for file in written.paths)}"
+        self.session.message.emit("warning" if left_out else "info", f"{text}. {left_out}" if left_out else text)
+
+    def _limits(self) -> Range:
+        """Of the heights that a file has; None: all."""
+        return None if self.all_heights.isChecked() else self._file_range
 
     def _take(self, made: HeightMap | None) -> None:
         before, self.made = self.made, made
         self.split.setVisible(made is not None)
         self.read.setVisible(made is not None)
         self.export.setEnabled(made is not None)
+        self.all_heights.setEnabled(made is not None)
         if made is None:
             return
         self._draw()
+        self._tell()
         rows, columns = made.heights.shape
         if before is None or before.heights.shape != made.heights.shape:
             self.view.fit()
@@ -174,13 +198,21 @@ class HeightMapTab(QWidget):
             for handle, column in zip(self.line.getHandles(), (edge, columns - 1 - edge), strict=True):
                 self.line.movePoint(handle, (column, middle), coords="parent")
         self._show_profile()
+
+    def _tell(self) -> None:
+        made = self.made
+        if made is None:
+            return
+        rows, columns = made.heights.shape
         size = f"{columns} x {rows} cells of {1e3 * made.pitch:.4g} mm of {made.points} points, "
         share = f"{np.isfinite(made.heights).mean():.1%} with a height"
         texts = [size + share]
         if np.isfinite(made.heights).any():
             low, high = 1e3 * np.nanmin(made.heights), 1e3 * np.nanmax(made.heights)
             texts.append(f"Heights from {low:.4g} to {high:.4g} mm")
-            texts.append(sigma_sentence(sigma_record(made, encoded(made.heights)[1])).replace(" um", " µm"))
+            texts.append(
+                sigma_sentence(sigma_record(made, encoded(made.heights, self._limits())[1])).replace(" um", " µm")
+            )
         self.told.setText("\n".join(texts))
 
     def _draw(self) -> None:
@@ -258,6 +290,7 @@ class HeightMapTab(QWidget):
         row = QHBoxLayout()
         row.addWidget(self.pitch, 1)
         row.addWidget(self.export)
+        row.addWidget(self.all_heights)
         form.addRow("Cells", row)
         column = QVBoxLayout(self)
         column.setContentsMargins(8, 8, 8, 8)

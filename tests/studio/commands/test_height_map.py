@@ -54,6 +54,28 @@ def test_the_picture_and_the_file_beside_it_give_the_heights_exactly(points: Pat
     assert 0.3 < beside["sigma"]["cells_over_points"] <= 1.0 and "random sigma" in call(points).stdout
 
 
+@pytest.mark.parametrize("errors", [True, False])
+def test_cells_of_a_stray_point_are_left_out_and_counted_or_kept_where_asked(points: Path, errors: bool) -> None:
+    """With and without known errors; a pin that is no stray point stays, however few points it has."""
+    cloud, stray, pin = read_ply(points), 5 * SIDE + 6, 8 * SIDE + 3
+    cloud["z"][[stray, pin]] += (-0.6, 5e-3 if errors else 0.0)
+    if errors:
+        cloud["error_depth"] = np.random.default_rng(1).normal(0.0, 1e-5, len(cloud["z"]))
+        cloud["error_depth"][stray] = 0.6
+    write_ply(points, cloud)
+    out = points.with_name("map.png")
+    done = call(points, "--pitch", "0.5", "--out", out)
+    assert done.exit_code == 0 and "cells are left out" in done.stdout and "--all-heights" in done.stdout
+    beside = json.loads(out.with_suffix(".json").read_text())
+    left_out, heights = beside["left_out"], height_map(read_ply(points), 5e-4).heights
+    assert left_out["all_from"] == np.nanmin(heights) and left_out["kept_to"] == np.nanmax(heights)
+    assert 0 < left_out["cells"] < 16 and beside["valid"] + left_out["cells"] == np.count_nonzero(np.isfinite(heights))
+    assert beside["scale"] < 1e-7
+    done = call(points, "--pitch", "0.5", "--out", out, "--all-heights")
+    whole = json.loads(out.with_suffix(".json").read_text())
+    assert "left out" not in done.stdout and whole["left_out"]["cells"] == 0 and whole["scale"] > 50 * beside["scale"]
+
+
 def test_it_replaces_its_own_files_and_no_others(points: Path) -> None:
     out = points.with_name("map.tiff")
     assert [call(points, "--out", out).exit_code for _ in range(2)] == [0, 0]

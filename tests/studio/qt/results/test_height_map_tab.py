@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -21,7 +22,7 @@ from studio.qt.core.session import Render, Session
 from studio.qt.results.height_map_tab import NOTHING, HeightMapTab
 from studio.scan.deviation import read_cloud
 from studio.scan.first_range import height_range
-from studio.scan.height_map import read_points
+from studio.scan.height_map import file_range, read_points
 from studio.scan.options import ScanOptions
 from studio.scan.scan import run_scan
 from studio.scan.scan_folder import open_folder
@@ -105,14 +106,49 @@ def test_the_mouse_reads_a_cell_and_the_line_its_profile(tab: HeightMapTab) -> N
     assert distance[-1] == pytest.approx(made.pitch * np.hypot(columns - 1, rows - 1))
 
 
-def test_what_it_writes_reads_back_as_what_it_shows(tab: HeightMapTab, tmp_path: Path) -> None:
+def test_what_it_writes_reads_back_as_what_it_shows(
+    tab: HeightMapTab, scanned: tuple[Path, Path], tmp_path: Path
+) -> None:
     made, file = tab.made, tmp_path / "map.tif"
     assert made is not None
     tab.write(file)
     beside = json.loads(file.with_suffix(".json").read_text())
     numbers = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
     heights = np.where(numbers > 0, beside["offset"] + beside["scale"] * numbers.astype(float), np.nan)
+    limits = file_range(read_points(scanned[1] / "points.ply"))
+    assert limits is not None
+    within = np.where((made.heights >= limits[0]) & (made.heights <= limits[1]), made.heights, np.nan)
+    np.testing.assert_allclose(heights, within, atol=0.5001 * beside["scale"], rtol=0.0)
+    left_out = np.count_nonzero(np.isfinite(made.heights)) - np.count_nonzero(np.isfinite(within))
+    assert beside["left_out"]["cells"] == left_out
+    tab.all_heights.click()
+    tab.write(file)
+    beside = json.loads(file.with_suffix(".json").read_text())
+    numbers = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
+    heights = np.where(numbers > 0, beside["offset"] + beside["scale"] * numbers.astype(float), np.nan)
     np.testing.assert_allclose(heights, made.heights, atol=0.5001 * beside["scale"], rtol=0.0)
+    assert beside["left_out"]["cells"] == 0
+
+
+def test_what_a_file_leaves_out_is_told(tab: HeightMapTab, tmp_path: Path) -> None:
+    """One stray cell 600 mm below took ten times the levels from all others."""
+    made = tab.made
+    assert made is not None and tab._file_range is not None
+    told: list[tuple[str, str]] = []
+    tab.session.message.connect(lambda kind, text: told.append((kind, text)))
+    heights = np.clip(made.heights, *tab._file_range)
+    tab.made = replace(made, heights=heights)
+    tab.write(tmp_path / "clean.png")
+    row, column = (int(one[0]) for one in np.nonzero(np.isfinite(heights)))
+    heights = heights.copy()
+    heights[row, column] = -0.6
+    tab.made = replace(made, heights=heights)
+    tab.write(tmp_path / "stray.png")
+    clean, stray = (json.loads((tmp_path / f"{name}.json").read_text()) for name in ("clean", "stray"))
+    assert stray["scale"] == pytest.approx(clean["scale"], rel=0.01) and stray["valid"] == clean["valid"] - 1
+    assert stray["left_out"]["cells"] == 1 and stray["left_out"]["all_from"] == -0.6
+    assert told[0][0] == "info" and told[1][0] == "warning"
+    assert "1 cell is left out" in told[1][1] and "from -600 to" in told[1][1]
 
 
 def test_a_single_frame_has_none_and_is_told_so(tab: HeightMapTab) -> None:
