@@ -35,6 +35,10 @@ class Delivery(Model):
         None, unit="m", label="Surface to", help="Its upper limit; empty: there is none.", ge=-1.0, le=1.0
     )
 
+    surface_of: str = quantity(
+        "", label="Surface of", help="The object that the surface is judged on; empty: all of them.", max_length=LONG
+    )
+
     @model_validator(mode="after")
     def _tolerance_is_one(self) -> Self:
         if self.lower is not None and self.upper is not None and not self.upper > self.lower:

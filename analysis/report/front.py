@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from analysis.deviation import ABOVE, BELOW, UNDECIDED, WITHIN, false_points, verdict_of, verdicts
+from analysis.distance import nearest_triangle
 from analysis.report.deviation_figure import DeviationMap, draw
 from analysis.report.gauge_table import MARKS
 from analysis.report.model import ReportInput
@@ -34,7 +35,7 @@ def front(report: ReportInput) -> dict[str, Any] | None:
     if told.is_empty:
         return None
     rows = report.record.chosen().rows
-    rows = rows[rows["valid"] & np.isfinite(rows["off_surface"])]
+    rows = of_judged(report, rows[rows["valid"] & np.isfinite(rows["off_surface"])])
     surface = _surface(report, rows)
     gauges = [_gauge_verdict(row) for row in report.measures]
     wanted = [one for one in (surface["verdict"], *gauges) if one]
@@ -45,12 +46,35 @@ def front(report: ReportInput) -> dict[str, Any] | None:
         "text": [line for line in told.text.splitlines() if line.strip()],
         "verdict": verdict,
         "verdict_text": VERDICTS[verdict],
-        "judged": _judged(bool(surface["verdict"]), gauges),
+        "judged": _judged(bool(surface["verdict"]), gauges, judged_objects(report)),
         "rule": RULE if verdict != "none" else "",
         "surface": surface,
         "map": _map(report, rows) if len(rows) else None,
         "how": _how(report, rows),
     }
+
+
+def of_judged(report: ReportInput, rows: Any) -> Any:
+    """The points of the object that the surface is judged on, by what is nearest to each; all where none is named."""
+    wanted, names = report.delivery.surface_of, _names(report)
+    if not wanted:
+        return rows
+    if wanted not in names or len(rows) == 0 or len(report.triangles) == 0:
+        return rows[:0]
+    nearest = nearest_triangle(rows["world"], report.vertices, report.triangles)
+    return rows[report.object_id[nearest] == names.index(wanted)]
+
+
+def judged_objects(report: ReportInput) -> str:
+    """By name, whose points count."""
+    wanted, names = report.delivery.surface_of, _names(report)
+    if wanted:
+        return wanted if wanted in names else f"{wanted}, which is none of: {', '.join(names)}"
+    return ", ".join(names) if len(names) < 2 else f"all: {', '.join(names)}"
+
+
+def _names(report: ReportInput) -> list[str]:
+    return [item.name for item in report.scene.visible_objects]
 
 
 def _who(report: ReportInput) -> list[tuple[str, str]]:
@@ -71,10 +95,10 @@ def _gauge_verdict(row: dict[str, Any]) -> str:
     return "undecided" if row["reason"] else str(row["verdict"] or "undecided")
 
 
-def _judged(surface: bool, gauges: list[str]) -> str:
+def _judged(surface: bool, gauges: list[str], objects: str) -> str:
     """What the verdict is of: the surface, measures, and how many of these have a tolerance."""
     having = sum(bool(one) for one in gauges)
-    of = ["the surface"] if surface else []
+    of = [f"the surface ({objects})"] if surface else []
     if having:
         of.append(f"{count(having)} of {count(len(gauges))} measures" if len(gauges) > 1 else "the measure")
     if not of:
@@ -92,10 +116,12 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
     """Verdict and table of the surface's deviation."""
     told, value = report.delivery, -rows["off_surface"]
     if len(value) == 0:
-        return {"verdict": "undecided" if told.has_tolerance else "", "mark": "", "rows": []}
+        table = [("Objects", judged_objects(report)), ("Points", "none")]
+        return {"verdict": "undecided" if told.has_tolerance else "", "mark": "", "rows": table}
     false = false_points(value)
     kept = value[~false]
     table = [
+        ("Objects", judged_objects(report)),
         ("Points", count(len(value))),
         ("False ones, far off all others", f"{count(int(false.sum()))} ({percent(float(false.mean()), 2)})"),
         ("Mean deviation, without them", micrometres(float(kept.mean()), 2)),

@@ -89,6 +89,8 @@ class FieldSpec:
     low_open: bool = False
     high_open: bool = False
     choices: tuple[Any, ...] = ()
+    labels: tuple[str, ...] = ()
+    """Of the choices, where they are names that a person gave."""
     optional: bool = False
     """May be empty (None)."""
     length: int | None = None
@@ -104,7 +106,14 @@ class FieldSpec:
     @property
     def structure(self) -> Any:
         """What decides the widgets of a form; a change of value alone keeps it."""
-        return self.name, self.kind, self.chosen, self.length, tuple(field.structure for field in self.fields)
+        return (
+            self.name,
+            self.kind,
+            self.chosen,
+            self.length,
+            self.labels,
+            tuple(field.structure for field in self.fields),
+        )
 
     def problem(self, value: Any) -> str | None:
         """Why a value is refused, in shown units, or None; only the field's own limits are asked."""
@@ -165,7 +174,21 @@ def describe_item(project: Project, path: FieldPath) -> FieldSpec:
     annotation, limits = _open(field.annotation, field.metadata)
     if last < len(path) - 1:
         annotation, limits = _open(get_args(annotation)[0], [])
-    return _spec(type(owner), name, annotation, limits, value, REQUIRED, _label(name, field), field.description or "")
+    spec = _spec(type(owner), name, annotation, limits, value, REQUIRED, _label(name, field), field.description or "")
+    return _with_objects(project, spec) if isinstance(value, Delivery) else spec
+
+
+def _with_objects(project: Project, spec: FieldSpec) -> FieldSpec:
+    """The object of a report's verdict is chosen from those that there are; one that is gone stays to be seen."""
+    own = project.delivery.surface_of
+    names = [item.name for item in project.scene.visible_objects]
+    names += [own] if own and own not in names else []
+    choices, labels = ("", *names), ("All objects", *names)
+    fields = [
+        replace(one, kind="choice", choices=choices, labels=labels) if one.name == "surface_of" else one
+        for one in spec.fields
+    ]
+    return replace(spec, fields=tuple(fields))
 
 
 def edited(project: Project, owner: FieldPath, spec: FieldSpec, value: Any) -> Project:

@@ -1,4 +1,4 @@
-"""The logo of a report: an image of the project's folder as it stands in the page. Qt-free."""
+"""The logo of a report: an image of the project's folder as it stands in the page; and what a report lacks. Qt-free."""
 
 from __future__ import annotations
 
@@ -19,8 +19,18 @@ MOST_PIXELS = 50_000_000
 
 
 def logo_remarks(project: Project, root: Path) -> list[str]:
-    """Why its logo is not in a project's report: for who makes it, and not for who is handed it."""
-    return [*filter(None, [logo_uri(project.delivery.logo, root)[1]])]
+    """Why its logo, or its surface, is not in a project's report: for who makes it, and not for who is handed it."""
+    return [*filter(None, [logo_uri(project.delivery.logo, root)[1], gone(project)])]
+
+
+def gone(project: Project) -> str:
+    """That the object on which the surface is judged is not there, so that nothing is decided; empty: it is."""
+    wanted, names = project.delivery.surface_of, [item.name for item in project.scene.visible_objects]
+    if not wanted or wanted in names:
+        return ""
+    return (
+        f"The report judges the surface of {wanted!r}, which is no visible object: choose another ({', '.join(names)})"
+    )
 
 
 def logo_uri(name: str, root: Path) -> tuple[str, str]:

@@ -291,7 +291,8 @@ class ChoiceField(QComboBox):
 
     @classmethod
     def of(cls, spec: FieldSpec) -> ChoiceField:
-        field = cls([(choice_label(value), value, "") for value in spec.choices])
+        labels = spec.labels or [choice_label(value) for value in spec.choices]
+        field = cls([(label, value, "") for label, value in zip(labels, spec.choices, strict=True)])
         field.show_value(spec.value)
         return field
 

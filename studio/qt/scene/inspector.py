@@ -22,7 +22,7 @@ from studio.qt.forms.form import Form
 from studio.qt.scene import mesh_importer, scene_actions
 from studio.qt.scene.mesh_bar import MeshBar, take_mesh
 from studio.qt.scene.scene_icons import item_icon
-from studio.scan.logo import logo_uri
+from studio.scan.logo import gone, logo_uri
 
 TITLES = {"scene": "Scene", "rig": "Rig", "camera": "Camera", "sensor": "Sensor", "render": "Render settings",
           "extraction": "Line extraction", "delivery": "Report to hand over",
@@ -127,9 +127,10 @@ class Inspector(QWidget):
         """Why the selection is not as it is set: in words, and at its fields."""
         text, problems = self.session.problem_of(self.session.selection), self.session.problems
         if self.session.selection == ("delivery",):
-            logo = logo_uri(self.session.project.delivery.logo, self.session.document.root)[1]
-            problems = {**problems, ("delivery", "logo"): logo} if logo else problems
-            text = "\n".join(filter(None, [text, logo]))
+            project = self.session.project
+            odd = {"logo": logo_uri(project.delivery.logo, self.session.document.root)[1], "surface_of": gone(project)}
+            problems = {**problems, **{("delivery", name): why for name, why in odd.items() if why}}
+            text = "\n".join(filter(None, [text, *odd.values()]))
         self.problem.setText(text)
         self.problem.setVisible(bool(text))
         self.form.mark(problems)

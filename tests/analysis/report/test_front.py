@@ -102,10 +102,10 @@ def test_a_verdict_says_how_many_measures_it_is_of() -> None:
     report = replace(handed(customer="Ada", lower=-0.2, upper=0.2), measures=rows)
     found = told(report)
     assert found["verdict"] == "pass"
-    assert found["judged"] == "Of the surface and 1 of 3 measures; the others have no tolerance."
+    assert found["judged"] == "Of the surface (laser) and 1 of 3 measures; the others have no tolerance."
     assert found["judged"] in render_page(report)
     none = replace(report, measures=rows[1:])
-    assert told(none)["judged"] == "Of the surface; the measures have no tolerance."
+    assert told(none)["judged"] == "Of the surface (laser); the measures have no tolerance."
 
 
 def test_the_mean_deviation_is_of_the_surface_and_false_points_are_counted() -> None:
@@ -115,9 +115,9 @@ def test_the_mean_deviation_is_of_the_surface_and_false_points_are_counted() -> 
     false = rows.copy()
     false["off_surface"][:3] = 0.05
     clean, told_of = (_surface(report, one)["rows"] for one in (rows, false))
-    assert [row[0] for row in clean][1:3] == ["False ones, far off all others", "Mean deviation, without them"]
-    assert clean[1][1].startswith("0 (") and told_of[1][1].startswith("3 (")
-    assert abs(float(told_of[2][1].split()[0])) < 1e6 * 0.05 / len(rows)
+    assert [row[0] for row in clean][2:4] == ["False ones, far off all others", "Mean deviation, without them"]
+    assert clean[2][1].startswith("0 (") and told_of[2][1].startswith("3 (")
+    assert abs(float(told_of[3][1].split()[0])) < 1e6 * 0.05 / len(rows)
     decided = _surface(handed(customer="Ada", lower=-0.04, upper=0.04), false)
     assert decided["verdict"] == "fail" and decided["rows"][-1] == ("Verdict without the false ones", MARKS["pass"])
 
@@ -131,3 +131,33 @@ def test_the_triangulation_angle_is_that_at_the_part() -> None:
     closed = np.median(np.degrees(np.arccos((far**2 + beside**2 - between**2) / (2.0 * far * beside))))
     shown = dict(told(report)["how"])["Triangulation angle (median)"]
     assert float(shown.rstrip("°")) == pytest.approx(closed, rel=1e-3)
+
+
+def test_the_surface_is_judged_on_the_object_that_is_named_and_the_page_says_on_which() -> None:
+    """A table beneath a part has points as well: its deviation decided the part's verdict."""
+    report = handed(customer="Ada", lower=-0.2, upper=0.2)
+    (wall,) = report.scene.objects
+    both = tuple(wall.model_copy(update={"name": name}) for name in ("part", "table"))
+    scene = report.scene.model_copy(update={"objects": both})
+    report = replace(report, scene=scene, object_id=np.array([0, 1]))
+    rows = report.record.chosen().rows
+    rows = rows[rows["valid"] & np.isfinite(rows["off_surface"])]
+    # the wall's two triangles meet where y = x
+    of_part = int(np.count_nonzero(rows["world"][:, 1] < rows["world"][:, 0]))
+    assert 0 < of_part < len(rows)
+    counts = {}
+    for name, judged in (
+        ("", "all: part, table"),
+        ("part", "part"),
+        ("table", "table"),
+        ("gone", "gone, which is none of"),
+    ):
+        told_to = report.delivery.model_copy(update={"surface_of": name})
+        found = told(replace(report, delivery=told_to))
+        assert found["surface"]["rows"][0][0] == "Objects" and found["surface"]["rows"][0][1].startswith(judged)
+        assert judged in found["judged"] and found["verdict"] == ("undecided" if name == "gone" else "pass")
+        counts[name] = int(found["surface"]["rows"][1][1].replace("none", "0"))
+    assert counts[""] == len(rows) == counts["part"] + counts["table"] and counts["gone"] == 0
+    assert of_part in (counts["part"], counts["table"])
+    only = report.delivery.model_copy(update={"surface_of": "part"})
+    assert "Of the surface (part)" in render_page(replace(report, delivery=only))

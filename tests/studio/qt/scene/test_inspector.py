@@ -14,6 +14,7 @@ from studio.project.document import Document
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.qt.core.session import Session
+from studio.qt.forms.fields import ChoiceField
 from studio.qt.forms.form import Section
 from studio.qt.scene.inspector import Inspector
 from tests.studio.qt.scene.inspector_hands import (
@@ -291,6 +292,18 @@ def test_several_selected_are_told_without_pushing_the_fields_out(session: Sessi
     assert inspector.form.parentWidget().minimumSizeHint().width() <= before
     session.select(LASER)
     assert "selected" not in inspector.hint.text()
+
+
+def test_the_object_of_the_report_is_chosen_from_those_that_there_are(session: Session, inspector: Inspector) -> None:
+    session.select(("delivery",))
+    names = [item.name for item in session.project.scene.visible_objects]
+    (field,) = [one for one in inspector.findChildren(ChoiceField) if one.values == ["", *names]]
+    assert [field.itemText(k) for k in range(field.count())] == ["All objects", *names]
+    field.setCurrentIndex(1)
+    field.activated.emit(1)
+    assert session.project.delivery.surface_of == names[0] and not inspector.problem.isVisibleTo(inspector)
+    session.set(("delivery", "surface_of"), "no such part")
+    assert "'no such part', which is no visible object" in inspector.problem.text()
 
 
 def test_a_logo_that_cannot_be_shown_is_told_at_its_field(session: Session, inspector: Inspector) -> None:
