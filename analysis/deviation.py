@@ -27,6 +27,8 @@ STILL = 1e-9
 """m: a step of the alignment that moves no point farther ends it."""
 FAR = 6.0
 """Robust sigmas from the median beyond which a point is no part of the best fit."""
+FAR_OFF = "far off: beyond 6 robust sigma of all"
+"""What such a point is called."""
 FREE = 0.1
 """Of the largest singular value: a freedom below it is held by one point in a hundred at most, as by those on a rim,
 and stays as it is."""
@@ -37,8 +39,11 @@ FEWEST = 6
 SMALL = 0.25
 
 
-def false_points(value: Float) -> NDArray[np.bool_]:
-    """(m,) values that are far off all others, as of points that are no part of the surface, or that are NaN."""
+def far_off(value: Float) -> NDArray[np.bool_]:
+    """(m,) values that are far off all others, as of points that are no part of the surface, or that are NaN.
+
+    Not to be taken for false scan lines, which carry a point although no line crosses them, at whatever distance.
+    """
     return ~np.asarray(np.abs(value - np.nanmedian(value)) <= FAR * robust_sigma(value))
 
 

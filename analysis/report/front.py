@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from analysis.deviation import ABOVE, BELOW, UNDECIDED, WITHIN, false_points, verdict_of, verdicts
+from analysis.deviation import ABOVE, BELOW, FAR_OFF, UNDECIDED, WITHIN, far_off, verdict_of, verdicts
 from analysis.distance import nearest_triangle
 from analysis.report.deviation_figure import DeviationMap, draw
 from analysis.report.gauge_table import MARKS
 from analysis.report.model import ReportInput
 from analysis.report.style import png_uri
+from analysis.report.total import total
 from analysis.report.units import count, degrees, micrometres, millimetres, milliwatts, percent
 from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float
@@ -23,6 +24,10 @@ VERDICTS = {
     "undecided": "Not decided within the uncertainty",
     "none": "No tolerance was given",
 }
+FAR_AND_FALSE = (
+    "A point is far off by its distance from the surface alone; a false scan line carries a point although no line "
+    "crosses its centre, at whatever distance."
+)
 RULE = (
     "By ISO 14253-1 with an expanded uncertainty of two sigma: within only what is proved to be within, "
     "out only what is proved to be out."
@@ -117,18 +122,19 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
     told, value = report.delivery, -rows["off_surface"]
     if len(value) == 0:
         table = [("Objects", judged_objects(report)), ("Points", "none")]
-        return {"verdict": "undecided" if told.has_tolerance else "", "mark": "", "rows": table}
-    false = false_points(value)
-    kept = value[~false]
+        return {"verdict": "undecided" if told.has_tolerance else "", "mark": "", "rows": table, "note": ""}
+    far = far_off(value)
+    kept = value[~far]
     table = [
         ("Objects", judged_objects(report)),
         ("Points", count(len(value))),
-        ("False ones, far off all others", f"{count(int(false.sum()))} ({percent(float(false.mean()), 2)})"),
+        (FAR_OFF.capitalize(), f"{count(int(far.sum()))} ({percent(float(far.mean()), 2)})"),
         ("Mean deviation, without them", micrometres(float(kept.mean()), 2)),
         ("95 % deviate less than, without them", micrometres(float(np.percentile(np.abs(kept), 95.0)))),
     ]
+    note = FAR_AND_FALSE if far.any() and total(report.record.chosen()).false_rows else ""
     if not told.has_tolerance:
-        return {"verdict": "", "mark": "", "rows": table}
+        return {"verdict": "", "mark": "", "rows": table, "note": note}
     lower = -math.inf if told.lower is None else told.lower
     upper = math.inf if told.upper is None else told.upper
     judged = verdicts(value, _sigma(rows), lower, upper)
@@ -143,9 +149,9 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
         ("Proved below", percent(shares[BELOW], 2)),
     ]
     verdict = verdict_of(judged)
-    if false.any() and (without := verdict_of(judged[~false])) != verdict:
-        table.append(("Verdict without the false ones", MARKS[without]))
-    return {"verdict": verdict, "mark": MARKS[verdict], "rows": table}
+    if far.any() and (without := verdict_of(judged[~far])) != verdict:
+        table.append(("Verdict without those far off", MARKS[without]))
+    return {"verdict": verdict, "mark": MARKS[verdict], "rows": table, "note": note}
 
 
 def _sigma(rows: Any) -> Float:

@@ -102,8 +102,8 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
         their = "its" if found.false_rows == 1 else "their"
         carry = f"{'carries' if found.false_rows == 1 else 'carry'} a point although no line crosses {their}"
         said.append(
-            f"{counted(found.false_rows, 'scan line')} {carry} centre, at the ends of the line or from stray light. "
-            f"{their.capitalize()} distance from the surface counts, {their} depth has no truth."
+            f"{counted(found.false_rows, 'false scan line')} {carry} centre, at the ends of the line or from stray "
+            f"light. {their.capitalize()} distance from the surface counts, {their} depth has no truth."
         )
     # what most points err by, all alike and each on its own
     usual = np.hypot(found.depth_z.median, found.depth_z.robust_sigma)

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from analysis.deviation import FAR_OFF
 from analysis.report.gauge_table import PLAIN
 from analysis.report.units import micrometres, percent
 from studio.runtime.streams import print_json
@@ -68,8 +69,8 @@ def details(record: dict[str, Any]) -> list[str]:
         told.insert(0, f"The nominal is {times:.3g} times as large as the part{doubt}")
     if record["share_false"]:
         rest = micrometres(record["rms_without_false"])
-        false = f"{percent(record['share_false'], 2)} of the points are false, 6 robust sigma from the median"
-        told.append(f"{false}: rms {rest} without them")
+        far = f"{percent(record['share_false'], 2)} of the points are {FAR_OFF}"
+        told.append(f"{far}; rms {rest} without them")
     if record["alignment"] != "none":
         shift = ", ".join(f"{round(1e3 * value, 4) + 0.0:+.4f}" for value in record["shift"])
         turn = math.degrees(record["turn"])

@@ -106,14 +106,8 @@ class FieldSpec:
     @property
     def structure(self) -> Any:
         """What decides the widgets of a form; a change of value alone keeps it."""
-        return (
-            self.name,
-            self.kind,
-            self.chosen,
-            self.length,
-            self.labels,
-            tuple(field.structure for field in self.fields),
-        )
+        fields = tuple(field.structure for field in self.fields)
+        return self.name, self.kind, self.chosen, self.length, self.labels, fields
 
     def problem(self, value: Any) -> str | None:
         """Why a value is refused, in shown units, or None; only the field's own limits are asked."""
@@ -180,15 +174,11 @@ def describe_item(project: Project, path: FieldPath) -> FieldSpec:
 
 def _with_objects(project: Project, spec: FieldSpec) -> FieldSpec:
     """The object of a report's verdict is chosen from those that there are; one that is gone stays to be seen."""
-    own = project.delivery.surface_of
-    names = [item.name for item in project.scene.visible_objects]
-    names += [own] if own and own not in names else []
-    choices, labels = ("", *names), ("All objects", *names)
-    fields = [
-        replace(one, kind="choice", choices=choices, labels=labels) if one.name == "surface_of" else one
-        for one in spec.fields
-    ]
-    return replace(spec, fields=tuple(fields))
+    found = dict.fromkeys(("", *(item.name for item in project.scene.visible_objects), project.delivery.surface_of))
+    chosen: dict[str, Any] = {"kind": "choice", "choices": tuple(found), "labels": ("All objects", *tuple(found)[1:])}
+    return replace(
+        spec, fields=tuple(replace(one, **chosen) if one.name == "surface_of" else one for one in spec.fields)
+    )
 
 
 def edited(project: Project, owner: FieldPath, spec: FieldSpec, value: Any) -> Project:

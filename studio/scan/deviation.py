@@ -25,7 +25,7 @@ from analysis.deviation import (
     Verdicts,
     best_fit,
     deviations,
-    false_points,
+    far_off,
     three_two_one,
     turn_and_shift,
     verdict_of,
@@ -102,7 +102,7 @@ class Compared:
         value, aligned = self.found.value, self.found.aligned
         median = float(np.median(value))
         robust = robust_sigma(value)
-        false = false_points(value)
+        far = far_off(value)
         shift, turn = turn_and_shift(aligned.motion, self.found.points)
         counts = None
         if self.verdicts is not None:
@@ -130,8 +130,8 @@ class Compared:
             "p95": float(np.percentile(np.abs(value), 95.0)),
             "median": median,
             "robust_sigma": robust,
-            "share_false": float(false.mean()),
-            "rms_without_false": float(np.sqrt((value[~false] ** 2).mean())),
+            "share_false": float(far.mean()),
+            "rms_without_false": float(np.sqrt((value[~far] ** 2).mean())),
             "share_beyond": _share_beyond(value, self.question),
             "median_sigma": known(float(np.nanmedian(self.sigma)) if np.isfinite(self.sigma).any() else math.nan),
             "lower": self.question.lower,

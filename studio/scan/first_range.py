@@ -1,11 +1,11 @@
-"""Which values colours and axes show before a person says otherwise: a few false points must not decide. Qt-free."""
+"""Which values colours and axes show before a person says otherwise: a few points far off must not decide. Qt-free."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from analysis.cloud import Cloud
-from analysis.deviation import FAR, false_points
+from analysis.deviation import FAR, far_off
 from analysis.measures import robust_sigma
 from render.base.arrays import Float
 from studio.scan.deviation import Compared
@@ -20,20 +20,20 @@ Ends = tuple[float, float]
 
 
 def deviation_limit(made: Compared) -> float:
-    """m: twice the larger tolerance; without one, what holds the points that are not false."""
+    """m: twice the larger tolerance; without one, what holds the points that are not far off."""
     asked = [abs(limit) for limit in (made.question.lower, made.question.upper) if limit]
     if asked:
         return OVER_TOLERANCE * max(asked)
     value = made.found.value
-    return symmetric_limit(value[~false_points(value)])
+    return symmetric_limit(value[~far_off(value)])
 
 
 def height_range(points: Cloud) -> Ends | None:
-    """m, of the points that are not false, where their errors are known; None: there is nothing to show a range of."""
+    """m, of the points that are not far off, where their errors are known; None: there is nothing to show."""
     heights = points["z"]
     errors = points.get("error_depth")
     if errors is not None and np.isfinite(errors).any():
-        heights = heights[~false_points(errors)]
+        heights = heights[~far_off(errors)]
     heights = heights[np.isfinite(heights)]
     return _wider(heights, WIDER) if len(heights) else None
 

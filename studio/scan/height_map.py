@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.cloud import Cloud, merge, ply_pieces
-from analysis.deviation import false_points
+from analysis.deviation import far_off
 from analysis.height_map import HeightMap, encoded, height_map
 from analysis.report.units import digits
 from render.base.arrays import Float
@@ -75,7 +75,7 @@ def file_range(points: Cloud) -> tuple[float, float] | None:
     """
     heights, errors = points["z"], points.get("error_depth")
     if errors is not None and np.isfinite(errors).any():
-        near = heights[~false_points(errors) & np.isfinite(heights)]
+        near = heights[~far_off(errors) & np.isfinite(heights)]
         return (float(near.min()), float(near.max())) if len(near) else None
     heights = heights[np.isfinite(heights)]
     low, high = np.percentile(heights, ENDS).tolist() if len(heights) else (0.0, 0.0)

@@ -98,7 +98,7 @@ def test_a_false_point_far_off_draws_nothing_to_it(kind: str, place: int) -> Non
 
 
 @pytest.mark.parametrize("kind", ["radius", "straightness", "angle", "step", "gap"])
-def test_several_false_points_side_by_side_draw_nothing_to_them(kind: str) -> None:
+def test_several_far_off_side_by_side_draw_nothing_to_them(kind: str) -> None:
     """Each has others beside it, so that none stands alone: a sphere of 49 mm was read as 477 mm."""
     height, exact = shape(kind)
     points = profile(height, noise=noises(1, 1.0, seed=6)[0])
@@ -176,7 +176,7 @@ def test_a_flat_top_with_rounded_edges_says_that_it_is_no_peak() -> None:
     assert read(gauge("peak"), 0, profile(true, noise=noise), profile(true)).remark == ""
 
 
-def test_false_points_behind_a_soft_edge_draw_nothing_to_them() -> None:
+def test_far_off_behind_a_soft_edge_draw_nothing_to_them() -> None:
     """The line leaves its curve over a few points before it leaps: the leap is within what is off."""
     for noise in noises(20, 1.0, seed=13):
         height = np.full(len(ACROSS), -0.5)

@@ -20,7 +20,7 @@ def test_edges_ascend_and_hold_the_tolerance_and_every_value(lower: float | None
         assert edges[0] <= value.min() and edges[-1] >= value.max()
 
 
-def test_a_few_false_points_far_away_leave_the_bands_where_the_others_are() -> None:
+def test_a_few_far_off_far_away_leave_the_bands_where_the_others_are() -> None:
     value = np.random.default_rng(1).normal(scale=1e-5, size=5000)
     value[:25] = -0.8
     edges = levels(value, -5e-5, 5e-5)

@@ -54,5 +54,5 @@ def test_a_bias_that_all_points_have_is_not_laid_to_outliers() -> None:
 def test_one_false_row_is_told_as_one() -> None:
     scene, frames = make_frames(steps=STEPS)
     found = total(report_of(scene, frames).record.chosen())
-    for count, told in ((1, "1 scan line carries a point"), (2, "2 scan lines carry a point")):
+    for count, told in ((1, "1 false scan line carries a point"), (2, "2 false scan lines carry a point")):
         assert any(text.startswith(told) for text in remarks(dataclasses.replace(found, false_rows=count)))

@@ -11,9 +11,10 @@ import pytest
 from pydantic import ValidationError
 
 from analysis.report.delivery import Delivery
-from analysis.report.front import _surface, front
+from analysis.report.front import FAR_AND_FALSE, _surface, front
 from analysis.report.gauge_table import MARKS
 from analysis.report.model import ReportInput
+from analysis.report.total import total
 from analysis.report.write import render_page
 from tests.analysis.report.test_report import make_report
 
@@ -108,18 +109,18 @@ def test_a_verdict_says_how_many_measures_it_is_of() -> None:
     assert told(none)["judged"] == "Of the surface (laser); the measures have no tolerance."
 
 
-def test_the_mean_deviation_is_of_the_surface_and_false_points_are_counted() -> None:
+def test_the_mean_deviation_is_of_the_surface_and_far_off_are_counted() -> None:
     report = handed(customer="Ada")
     rows = report.record.chosen().rows
     rows = rows[rows["valid"] & np.isfinite(rows["off_surface"])].copy()
     false = rows.copy()
     false["off_surface"][:3] = 0.05
     clean, told_of = (_surface(report, one)["rows"] for one in (rows, false))
-    assert [row[0] for row in clean][2:4] == ["False ones, far off all others", "Mean deviation, without them"]
+    assert [row[0] for row in clean][2:4] == ["Far off: beyond 6 robust sigma of all", "Mean deviation, without them"]
     assert clean[2][1].startswith("0 (") and told_of[2][1].startswith("3 (")
     assert abs(float(told_of[3][1].split()[0])) < 1e6 * 0.05 / len(rows)
     decided = _surface(handed(customer="Ada", lower=-0.04, upper=0.04), false)
-    assert decided["verdict"] == "fail" and decided["rows"][-1] == ("Verdict without the false ones", MARKS["pass"])
+    assert decided["verdict"] == "fail" and decided["rows"][-1] == ("Verdict without those far off", MARKS["pass"])
 
 
 def test_the_triangulation_angle_is_that_at_the_part() -> None:
@@ -161,3 +162,17 @@ def test_the_surface_is_judged_on_the_object_that_is_named_and_the_page_says_on_
     assert of_part in (counts["part"], counts["table"])
     only = report.delivery.model_copy(update={"surface_of": "part"})
     assert "Of the surface (part)" in render_page(replace(report, delivery=only))
+
+
+def test_far_off_and_false_are_told_apart_where_both_appear(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One word for both had a reader take points far off the surface for those of scan lines without a line."""
+    report = handed(customer="Ada")
+    rows = report.record.chosen().rows
+    rows = rows[rows["valid"] & np.isfinite(rows["off_surface"])].copy()
+    assert _surface(report, rows)["note"] == ""
+    rows["off_surface"][:3] = 0.05
+    assert _surface(report, rows)["note"] == "", "there is no false scan line"
+    found = replace(total(report.record.chosen()), false_rows=2)
+    monkeypatch.setattr("analysis.report.front.total", lambda _: found)
+    assert _surface(report, rows)["note"] == FAR_AND_FALSE
+    assert not any("false" in label.lower() for label, _ in _surface(report, rows)["rows"])

@@ -18,6 +18,7 @@ from click.testing import CliRunner, Result
 import main
 from analysis.cloud import read_ply
 from render.world.world import build_world
+from studio.commands.deviation import details
 from studio.scan.deviation import Question, compare_cloud, read_cloud
 from studio.scan.scan_folder import open_folder
 from tests.studio.scan_of_steps import small_scan
@@ -59,6 +60,13 @@ def test_against_the_part_as_scanned_deviations_are_the_scan_s_own_distances(sca
     assert record == {"ok": True, "files": record["files"], **json.loads((scan / "deviation.json").read_text())}
     assert cv2.imread(str(scan / "deviation.png")) is not None
     assert call("deviation", scan).exit_code == 0  # replaces its own files
+
+
+def test_points_far_off_are_not_called_false(scan: Path) -> None:
+    """False is a scan line that carries a point although no line crosses it."""
+    record = {**told("deviation", scan), "share_false": 0.1, "rms_without_false": 1e-5}
+    said = " ".join(details(record))
+    assert "of the points are far off: beyond 6 robust sigma of all" in said and "false" not in said
 
 
 def test_a_nominal_that_is_lower_shifts_every_deviation_until_it_is_fitted(scan: Path, tmp_path: Path) -> None:
@@ -216,7 +224,7 @@ def test_files_of_others_are_not_replaced(scan: Path) -> None:
         assert (scan / name).read_text() == "mine"
 
 
-def test_false_points_draw_the_rms_but_not_the_robust_figures(made: Path) -> None:
+def test_far_off_draw_the_rms_but_not_the_robust_figures(made: Path) -> None:
     found = open_folder(made)
     cloud = read_cloud(made / "points.ply")
     whole = compare_cloud(found.project.scene, found.root, cloud, Question(lower=-1e-3, upper=1e-3)).record
