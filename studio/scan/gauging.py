@@ -104,14 +104,13 @@ def worst(found: Sequence[Reading]) -> Reading:
 
     def badness(one: Reading) -> tuple[bool, bool, bool, float]:
         gauge = one.gauge
+        low, high = gauge.limits
         if gauge.nominal is None:
             off = abs(one.error)
-        elif gauge.lower is None and gauge.upper is None:
+        elif low == -math.inf and high == math.inf:
             off = abs(one.value - gauge.nominal)
         else:
-            beyond = one.value - gauge.nominal
-            below, above = (gauge.lower or 0.0) - beyond, beyond - (gauge.upper or 0.0)
-            off = above if gauge.lower is None else below if gauge.upper is None else max(below, above)
+            off = max(low - one.value, one.value - high)
         known = off if math.isfinite(off) and not one.reason else -math.inf
         return not one.reason, one.verdict == "fail", one.verdict == "undecided", known
 
