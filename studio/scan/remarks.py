@@ -34,13 +34,16 @@ def scale_notes(image_scale: float) -> tuple[str, ...]:
     return tuple(filter(None, [scale_note(image_scale)]))
 
 
-def frame_remarks(project: Project, frame: Frame, measurements: Measurements) -> list[str]:
-    """What was odd about a frame, and what its errors say beyond themselves; nothing where all is as it should be."""
+def frame_remarks(project: Project, frame: Frame, measurements: Measurements, doubts: Sequence[str] = ()) -> list[str]:
+    """What was odd about a frame, and what its errors say beyond themselves; nothing where all is as it should be.
+
+    doubts: of `studio.preview.inspection.view_warnings`, in a frame that is developed as `project` says.
+    """
     with closing(record_of(project.scene, [frame_result(project, frame, measurements)])) as record:
         lacks = image_lacks(project, best(measurements, project))
         said = [*result_remarks(record), *lacks.values()]
         of_all = [OF_ALL_LASERS] if said and len(project.scene.lasers) > 1 else []
-        return [*frame.warnings, *of_all, *said]
+        return [*doubts, *frame.warnings, *of_all, *said]
 
 
 def result_remarks(record: ScanRecord) -> list[str]:

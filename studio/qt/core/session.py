@@ -65,6 +65,8 @@ class Render:
     """The scan that the frame is a step of; None: it was rendered alone."""
     made_from: dict[str, tuple[Frame, Development]] = field(default_factory=dict)
     """Frame and settings that "images" and "measurements" are of: while light refines, both lag behind."""
+    doubts: Sequence[str] = ()
+    """What `inspect` warns of, by the settings that `measurements` were made with."""
     asked: bool = True
     """False: the program made it unasked, as its first picture."""
     kept: bool = False

@@ -28,6 +28,7 @@ from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.frame import Frame
 from render.sensor.develop import Image
+from studio.preview.inspection import view_warnings
 from studio.preview.remedies import FILLED
 from studio.project.document import FieldPath
 from studio.qt.core.figures_age import FiguresAge
@@ -328,12 +329,14 @@ class DevelopPanel(QWidget):
 
         known = render.measurements if images is self._measured else {}
 
-        def work(progress: Progress, cancelled: Cancel) -> dict[str, list[Measurement]]:
+        def work(progress: Progress, cancelled: Cancel) -> tuple[dict[str, list[Measurement]], list[str]]:
             missing = tuple(method for method in methods if method not in known)
             found = {**known, **measure_again(frame, world, how, images, missing, cancelled=cancelled)}
-            return {method: found[method] for method in methods if method in found}
+            measured: dict[str, list[Measurement]] = {method: found[method] for method in methods if method in found}
+            return measured, view_warnings(how.project, frame, how.laser_power)
 
-        def then(found: dict[str, list[Measurement]]) -> None:
+        def then(done: tuple[dict[str, list[Measurement]], list[str]]) -> None:
+            found, render.doubts = done
             render.measurements, render.made_from["measurements"], self._measured = found, (frame, how), images
             now = time.perf_counter()
             self._free_at = now + RESTED * (now - self._began)

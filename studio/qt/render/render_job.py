@@ -24,9 +24,11 @@ def render_frames(
     world: World | None,
     run: Run,
     progress: Progress,
-    take: Callable[[World, Frame], None],
+    take: Callable[[World, Frame, tuple[str, ...]], None],
 ) -> None:
     """Prepare kernels, load what is not loaded and refine; every frame goes to `take`. Raises InputError, Cancelled.
+
+    With it goes what `inspect` warns of in the first one, which has the line's light.
 
     run: with the project's seed, whatever its own.
     """
@@ -51,7 +53,7 @@ def render_frames(
         run=replace(run, seed=project.seed, goal=goal_of(project, run.threads)),
         progress=progress,
     ):
-        take(world, replace(frame, warnings=(*(doubts or ()), *frame.warnings)))
+        take(world, frame, doubts or ())
         # the line is there before the kernels of all other light
         warm_up(for_all, lambda stage, done: progress(stage, 0.0), run.cancelled)
         doubts = tuple(view_warnings(project, frame)) if doubts is None else doubts

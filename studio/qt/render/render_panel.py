@@ -50,7 +50,7 @@ TRANSPORT = {
 class RenderPanel(QWidget):
     """Starts, holds and stops the render; its frames join the session's history as they get better."""
 
-    _refined = Signal(object, object)
+    _refined = Signal(object, object, object)
 
     def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -323,7 +323,7 @@ class RenderPanel(QWidget):
                 return render.world
         return None
 
-    def _take_frame(self, world: World, frame: Frame) -> None:
+    def _take_frame(self, world: World, frame: Frame, doubts: tuple[str, ...]) -> None:
         if self._job is None or (self._job.cancel_asked and not self._keep):
             return
         if self._render is None:
@@ -343,7 +343,7 @@ class RenderPanel(QWidget):
         else:
             self._render.frame = frame.carrying(self._render.frame)
             self.session.renders_changed.emit()
-        for text in frame.warnings:
+        for text in (*doubts, *frame.warnings):
             if text not in self._warned:
                 self._warned.add(text)
                 self.session.message.emit("warning", text)

@@ -172,9 +172,8 @@ class ResultsPanel(QWidget):
         else:
             self._show_histogram()
             self.table.show_measures(list(shown), table(list(shown.values()), view))
-            remarks = (
-                frame_remarks(render.measured_as, render.frame, render.measurements) if render.measurements else []
-            )
+            found, doubts = render.measurements, render.doubts
+            remarks = frame_remarks(render.measured_as, render.frame, found, doubts) if found else []
         self._show_by_step(render.scan, laser)
         self._tell_remarks(list(dict.fromkeys([*scale_notes(render.scanner_scale), *remarks])))
         self._tell_head()

@@ -74,6 +74,17 @@ def test_typing_half_the_exposure_halves_the_electrons_without_rendering(qtbot, 
     assert panel.exposure.box.value() == pytest.approx(1e3 * exposure, abs=1e-3)
 
 
+def test_what_is_warned_of_is_of_the_exposure_that_was_measured(qtbot, panel):
+    """Saturation was told of as it was when the render began, whatever the exposure was then."""
+    session = panel.session
+    exposure = 1e3 * session.project.sensor.exposure_time
+    for times, told in ((1000.0, True), (1.0, False)):
+        with qtbot.waitSignal(session.measured, timeout=20000):
+            type_into(qtbot, panel.exposure.box, f"{times * exposure:.4f}")
+        settle(qtbot, panel)
+        assert any("of the line saturates" in text for text in session.shown.doubts) == told
+
+
 def test_dragging_the_slider_is_one_step_of_the_history(qtbot, panel):
     document = panel.session.document
     slider = panel.exposure.slider
