@@ -46,6 +46,7 @@ def front(report: ReportInput) -> dict[str, Any] | None:
     wanted = [one for one in (surface["verdict"], *gauges) if one]
     verdict = next((one for one in ("fail", "undecided", "pass") if one in wanted), "none")
     return {
+        "title": told.part or report.title,
         "logo": report.logo,
         "who": [(label, value) for label, value in _who(report) if value],
         "text": [line for line in told.text.splitlines() if line.strip()],

@@ -75,7 +75,9 @@ def places(extraction: Extraction) -> list[Place]:
     middling = measured[np.argsort(e[measured])][int(0.45 * len(measured)) : int(0.55 * len(measured)) + 1]
     apart = np.abs(points.index[middling, None] - points.index[[worst, faint]]).min(axis=1)
     typical = int(middling[np.argmax(apart)])
-    found = [Place("Worst row", worst), Place("Typical row", typical), Place("Faintest row", faint)]
+    both = worst == faint
+    found = [Place("Worst and faintest row" if both else "Worst row", worst), Place("Typical row", typical)]
+    found += [] if both else [Place("Faintest row", faint)]
     return [place for i, place in enumerate(found) if place.point not in [other.point for other in found[:i]]]
 
 

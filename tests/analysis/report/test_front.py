@@ -57,6 +57,11 @@ def test_the_pages_hold_what_was_said_once_and_as_text() -> None:
     assert "No tolerance was given" in body
 
 
+def test_the_pages_are_headed_by_the_part_and_by_the_project_where_it_has_no_name() -> None:
+    assert told(handed(part="Bracket"))["title"] == "Bracket"
+    assert told(handed(author="Ada"))["title"] == make_report().title
+
+
 @pytest.mark.parametrize(
     ("limits", "verdict"),
     [
