@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,17 +55,36 @@ def section_points(profile: Profile, region: tuple[float, float], frame: Frame) 
     return np.asarray(wide[taken][~false[taken]])
 
 
-def unseen(profile: Profile, region: tuple[float, float], frame: Frame) -> str:
-    """What to say of stretches without points, over which an area knows nothing; empty: there are none."""
-    along = frame.local(profile.position[section_points(profile, region, frame)])[:, 0]
+@dataclass(frozen=True)
+class Unseen:
+    """Stretches of a section without points, or with none that are sure."""
+
+    length: float
+    """m, of all of them; 0 where they are too short to be told."""
+    sigma: float
+    """m^2, of the area there: that of any place, as likely as another, within half a box on either side of the straight
+    line, the box as long as the stretch and as high as its ends are apart, or, of ends at one height, as it is long."""
+
+    @property
+    def remark(self) -> str:
+        """Empty: there are none to be told."""
+        if self.length == 0.0:
+            return ""
+        return (
+            f"{1e3 * self.length:.3g} mm of its section carry no points, or none that are sure: straight lines join "
+            "the others, and its sigma allows for half a box on either side of them"
+        )
+
+
+def unseen(profile: Profile, region: tuple[float, float], frame: Frame) -> Unseen:
+    """Where an area knows nothing of its section."""
+    along, across = frame.local(profile.position[section_points(profile, region, frame)]).T
     apart = np.diff(np.clip(along, *section(region, frame)))
-    wide = apart[apart > UNSEEN * np.median(apart)] if len(apart) else apart
-    if wide.sum() <= UNSEEN_SHARE * (region[1] - region[0]):
-        return ""
-    return (
-        f"{1e3 * wide.sum():.3g} mm of its section carry no points, or none that are sure: straight lines join the "
-        "others, and its sigma does not know what lies there"
-    )
+    wide = apart > UNSEEN * np.median(apart) if len(apart) else np.zeros(0, dtype=np.bool_)
+    length, height = apart[wide], np.abs(np.diff(across))[wide]
+    told = float(length.sum()) > UNSEEN_SHARE * (region[1] - region[0])
+    half_box = 0.5 * float(np.sum(length * np.maximum(height, length)))
+    return Unseen(float(length.sum()) if told else 0.0, half_box / math.sqrt(3.0))
 
 
 def area_above(profile: Profile, region: tuple[float, float], frame: Frame) -> Fit:

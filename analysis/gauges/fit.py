@@ -28,6 +28,7 @@ DRAWN_SIGMAS = 3.0
 """A usual miss from which far points may have drawn the curve to them: they have if most lie so much nearer another."""
 DRAWN, DRAWN_SEED = 50, 11
 """Curves that are drawn by chance then: with a third of the points false, 15 of them have no false one in three."""
+DRAWN_STEPS = 2
 ALONE = 3.0
 """Times the steps on either side, of a step that stands alone."""
 GRAZING = 1e-3
@@ -192,21 +193,37 @@ def _of_most_points(
     Stat. Assoc. 79, 1984): no far points draw it to them, as long as they are fewer than half.
     """
     random, curve, used = np.random.default_rng(DRAWN_SEED), curve_of(here), np.flatnonzero(here)
-    best, least = np.zeros(len(local)), math.inf
-    for _ in range(DRAWN):
-        some = np.sort(random.choice(len(local), parameters, replace=False))
-        of_some = np.zeros_like(here)
-        of_some[used[some]] = True
-        even = np.ones(parameters), np.zeros(parameters)
-        with np.errstate(all="ignore"):  # points that are no curve's
-            own = curve_of(of_some)
-            theta = _solved(own, local[some], direction[some], even, start(local[some]), FOOT_STEPS)
-            e = _misses(curve, local, direction, theta)[0]
-        middle = float(np.median(np.abs(e)))
-        if middle < least:
-            best, least = e, middle
+    best, least = start(local), math.inf
+    with np.errstate(all="ignore"):  # points that are no curve's
+        for _ in range(DRAWN):
+            some = np.sort(random.choice(len(local), parameters, replace=False))
+            of_some = np.zeros_like(here)
+            of_some[used[some]] = True
+            theta = _through(curve_of(of_some), local[some], start(local[some]))
+            value, by_point, _ = curve(local, theta)
+            # to first order: which curve is nearest is not a matter of where the feet of its points are
+            middle = float(np.median(np.abs(value / _along(by_point, direction))))
+            if middle < least:
+                best, least = theta, middle
+        best = _misses(curve, local, direction, best)[0]
+    least = float(np.median(np.abs(best)))
     usual = max(1.0, MAD_TO_SIGMA * least)
     return _off_at_a_leap(best, OUTLIER_SIGMAS * usual), usual
+
+
+def _through(curve: Curve, points: Float, theta: Float) -> Float:
+    """Parameters of the curve through as many points as it has of them; a line and two levels take the first step."""
+    for _ in range(DRAWN_STEPS):
+        value, _, by_theta = curve(points, theta)
+        theta = theta - np.linalg.lstsq(by_theta, value, rcond=None)[0]
+    return theta
+
+
+def _along(by_point: Float, direction: Float) -> Float:
+    """(n,) change of F where a point moves along its own direction, away from 0 where it slides along the curve."""
+    step = np.einsum("ij,ij->i", by_point, direction)
+    least = GRAZING * np.linalg.norm(by_point, axis=1) * np.linalg.norm(direction, axis=1)
+    return np.where(np.abs(step) < least, np.copysign(least, step), step)
 
 
 def _off_at_a_leap(e: Float, limit: float) -> NDArray[np.bool_]:
@@ -244,9 +261,7 @@ def _misses(curve: Curve, local: Float, direction: Float, theta: Float) -> tuple
     e = np.zeros(len(local))
     for _ in range(FOOT_STEPS):
         value, by_point, by_theta = curve(local - e[:, None] * direction, theta)
-        step = np.einsum("ij,ij->i", by_point, direction)
-        least = GRAZING * np.linalg.norm(by_point, axis=1) * np.linalg.norm(direction, axis=1)
-        step = np.where(np.abs(step) < least, np.copysign(least, step), step)
+        step = _along(by_point, direction)
         e = e + value / step
         # the foot of a wild point, which is left out soon, may be anywhere
         reach = OUTLIER_SIGMAS * max(1.0, robust_sigma(e))

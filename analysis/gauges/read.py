@@ -28,6 +28,7 @@ MISFITS = {
     "peak": "points miss its parabola by {:.0f} times their sigma: value and truth may be off the top; of a flat one "
     "take a step height, else a narrower region"
 }
+NO_TRUTH = "; the exact line does not reach there either, so that the area has no truth"
 STRAIGHTEST = 10.0
 """Lengths of its region, of the radius of an edge: beyond, the points are those of a flat side."""
 SPARE = 2
@@ -87,16 +88,25 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
     random, systematic = measured.sigmas(gradient)
     used = np.count_nonzero(np.any([one.here for one in fits], axis=0))
     ratio = max(one.ratio for one in fits)
-    remark = unseen(measured, gauge.regions[1], fits[0].frame) if gauge.kind == "area" else ""
+    true, remark = _true_value(gauge, truth), ""
+    if gauge.kind == "area":
+        hidden = unseen(measured, gauge.regions[1], fits[0].frame)
+        systematic, remark = math.hypot(systematic, hidden.sigma), hidden.remark
+        remark += NO_TRUTH if remark and math.isnan(true) else ""
     if not remark and ratio > MISFIT:
         remark = MISFITS.get(gauge.kind, OTHER_SHAPE).format(ratio)
     sigma, count = ratio * random, int(used)
-    return Reading(gauge, step, value, sigma, systematic, count, _true_value(gauge, truth), remark=remark)
+    return Reading(gauge, step, value, sigma, systematic, count, true, remark=remark)
 
 
 def _true_value(gauge: Gauge, truth: Profile | None) -> float:
     found = "" if truth is None else _value(gauge, truth)
-    return NAN if isinstance(found, str) else found[0]
+    if isinstance(found, str) or truth is None:
+        return NAN
+    value, _, fits = found
+    # the exact line is seen no farther than the measured one: over what is hidden it tells no area either
+    hidden = gauge.kind == "area" and unseen(truth, gauge.regions[1], fits[0].frame).length > 0.0
+    return NAN if hidden else value
 
 
 def parts_of(gauge: Gauge, profile: Profile) -> list[Float] | str:

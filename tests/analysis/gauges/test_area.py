@@ -7,6 +7,8 @@ import pytest
 
 from analysis.gauges.area import area_above
 from analysis.gauges.fit import Frame
+from analysis.gauges.gauge import Gauge
+from analysis.gauges.profile import Profile
 from analysis.gauges.read import read
 from tests.analysis.gauges.profiles import ACROSS, PITCH, gauge, noises, profile, shape
 
@@ -51,6 +53,29 @@ def test_spikes_are_left_out_and_holes_are_bridged() -> None:
     holed = read(gauge("area"), 0, profile(height).taken(kept), None)
     assert holed.value == pytest.approx(exact, rel=1e-7)
     assert holed.remark.startswith("2.4 mm of its section carry no points") and clean.remark == "" == spiked.remark
+
+
+def test_sigma_allows_for_what_is_hidden_behind_an_edge() -> None:
+    """A block of 50 mm hides 4.6 mm behind it: a line over this shadow adds 115 mm2, on the exact line too.
+
+    The area failed its tolerance by 128 mm2 with a sigma of 0.3, and agreed with a truth that was bridged alike.
+    """
+    x = np.arange(-100.0, 100.0, 0.25) * 1e-3
+    height = -0.5 + np.where(np.abs(x) < 0.04, 0.05, 0.0)
+    exact = 0.05 * (0.08 - 0.25e-3)  # its last edge is a slope between two points
+    seen = ~((x >= 0.04) & (x < 0.0446))
+    asked = Gauge(kind="area", regions=((-0.09, -0.05), (-0.06, 0.06)), nominal=exact, lower=-2e-5, upper=2e-5)
+    whole = Profile(
+        np.stack([x, height], axis=1), np.tile([0.0, 1e-6], (len(x), 1)), np.zeros((len(x), 2, 0)),
+        np.arange(len(x)), np.ones(len(x)),
+    )  # fmt: skip
+    clear, shaded = read(asked, 0, whole, whole), read(asked, 0, whole.taken(seen), whole.taken(seen))
+    assert clear.truth == pytest.approx(exact, rel=1e-7) and clear.verdict == "pass" and clear.remark == ""
+    assert shaded.value - exact == pytest.approx(0.5 * 0.0046 * 0.05, rel=0.1)
+    assert abs(shaded.value - exact) < 2.0 * shaded.sigma and shaded.verdict == "undecided"
+    assert np.isnan(shaded.truth) and "has no truth" in shaded.remark
+    # where the exact line goes on, the error is that of what was bridged
+    assert read(asked, 0, whole.taken(seen), whole).error == pytest.approx(shaded.value - clear.value)
 
 
 def test_points_that_are_far_less_sure_than_the_others_are_bridged() -> None:
