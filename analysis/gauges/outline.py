@@ -10,6 +10,7 @@ from analysis.gauges.fit import Fit
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import crossing, curves_of, far_point, line_of, parts_of
+from analysis.gauges.undetermined import undetermined
 from render.base.arrays import Float
 
 ARC_POINTS = 65
@@ -29,6 +30,8 @@ def outline(gauge: Gauge, profile: Profile) -> tuple[list[Float], Float]:
     if isinstance(parts, str):
         return [], np.empty((0, 2))
     fits, _ = curves_of(gauge, profile, parts)
+    if undetermined(gauge, fits):
+        return [], np.empty((0, 2))
     match gauge.kind:
         case "step":
             return _levels(fits[0], profile, parts)

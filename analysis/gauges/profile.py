@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,8 @@ class Profile:
     """(m,) scan line."""
     correlation_length: Float
     """(m,) scan lines that err alike, as of `Points`."""
+    fitted: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+    """The curves that were fitted to it so far, for whoever reads and then draws them; by kind and regions."""
 
     def weight(self, low: float, high: float) -> Float:
         """(m,) weights of the points across the fan between two places, m: 0 outside and at the ends, 1 in the middle.

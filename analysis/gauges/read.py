@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.gauges.area import area_above, section, unseen, without_unsure
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
-from analysis.gauges.gauge import REGIONS, Gauge, Verdict
+from analysis.gauges.gauge import MOST_GAUGES, REGIONS, Gauge, Verdict
 from analysis.gauges.profile import Profile
 from analysis.gauges.undetermined import undetermined
 from render.base.arrays import Float
@@ -159,7 +159,17 @@ Function = Callable[[Sequence[Float]], float]
 
 
 def curves_of(gauge: Gauge, profile: Profile, parts: list[Float]) -> tuple[list[Fit], Function]:
-    """The curves that a value is of, and the value of their parameters."""
+    """The curves that a value is of, and the value of their parameters; fitted once to each profile."""
+    key = gauge.kind, gauge.regions
+    if key not in profile.fitted:
+        if len(profile.fitted) >= MOST_GAUGES:  # an edge that is dragged leaves one behind at every place
+            profile.fitted.clear()
+        profile.fitted[key] = _fitted(gauge, profile, parts)
+    found: tuple[list[Fit], Function] = profile.fitted[key]
+    return found
+
+
+def _fitted(gauge: Gauge, profile: Profile, parts: list[Float]) -> tuple[list[Fit], Function]:
     match gauge.kind:
         case "step":
             whole = np.maximum(*parts)

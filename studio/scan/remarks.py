@@ -39,7 +39,8 @@ def frame_remarks(project: Project, frame: Frame, measurements: Measurements, do
 
     doubts: of `studio.preview.inspection.view_warnings`, in a frame that is developed as `project` says.
     """
-    with closing(record_of(project.scene, [frame_result(project, frame, measurements)])) as record:
+    unread = project.model_copy(update={"measures": ()})  # no remark is on the part's measures
+    with closing(record_of(project.scene, [frame_result(unread, frame, measurements)])) as record:
         lacks = image_lacks(project, best(measurements, project))
         said = [*result_remarks(record), *lacks.values()]
         of_all = [OF_ALL_LASERS] if said and len(project.scene.lasers) > 1 else []

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from analysis.gauges.gauge import MOST_GAUGES
+from analysis.gauges.outline import outline
 from analysis.gauges.read import read
 from tests.analysis.gauges.profiles import ACROSS, KINDS, PITCH, REGION, gauge, noises, profile, shape
 
@@ -196,6 +198,19 @@ def test_what_hangs_on_a_bend_or_a_crossing_that_noise_made_has_no_value(kind: s
         reading = read(gauge(kind), 0, profile(height, noise=noise), profile(height))
         assert np.isnan(reading.value) and np.isnan(reading.truth), kind
         assert "points can tell" in reading.reason
+
+
+def test_a_profile_is_fitted_once_for_all_who_read_and_draw_it() -> None:
+    points = profile(shape("step")[0])
+    read(gauge("step"), 0, points, points)
+    (kept,) = points.fitted.values()
+    outline(gauge("step"), points)
+    assert list(points.fitted.values()) == [kept]
+    for k in range(3 * MOST_GAUGES):  # as of an edge that is dragged
+        read(
+            gauge("step").model_copy(update={"regions": ((-0.015, -0.003 - 1e-5 * k), (0.003, 0.015))}), 0, points, None
+        )
+    assert len(points.fitted) <= MOST_GAUGES
 
 
 def test_a_bend_that_the_points_do_tell_has_its_radius() -> None:

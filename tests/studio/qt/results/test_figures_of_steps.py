@@ -88,7 +88,6 @@ def test_what_stands_above_the_figures_is_seen_whole(panel: ResultsPanel, qtbot:
     panel.session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.5)
     label = panel.head_text
     assert label.text().startswith(CHANGED) and MEASURED_OTHERWISE in label.text() and label.isVisible()
-    qtbot.wait(20)
-    assert label.height() >= label.heightForWidth(label.width()) > 0
+    qtbot.waitUntil(lambda: label.height() >= label.heightForWidth(label.width()) > 0)
     assert label.width() >= max(label.fontMetrics().horizontalAdvance(word) for word in label.text().split())
     assert panel.rect().contains(label.mapTo(panel, label.rect().bottomRight()))
