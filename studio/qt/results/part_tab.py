@@ -277,10 +277,9 @@ class PartTab(QWidget):
             count = f" ({len(self._placed) + 1} of {len(names)})" if len(names) > 1 else ""
             text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
         elif 0 <= self.chosen < len(self.readings) and self.readings[self.chosen].reason:
-            reason = self.readings[self.chosen].reason
-            text = reason[:1].upper() + reason[1:]
+            text = _sentence(self.readings[self.chosen].reason)
         elif 0 <= self.chosen < len(self.readings) and self.readings[self.chosen].remark:
-            text = f"{self.readings[self.chosen].remark}."
+            text = _sentence(f"{self.readings[self.chosen].remark}.")
         elif 0 <= self.chosen < len(self._read) and (odd := beside_nominal(self._read[self.chosen])):
             text = odd
         elif self.readings and (render := self.session.shown) is not None:
@@ -288,6 +287,7 @@ class PartTab(QWidget):
         if self._read and (of := self._of_which()):
             text = f"{of} {text}".strip()
         self.told.setText(text)
+        self.told.setToolTip(text)
         self.told.setVisible(bool(text))
 
     def _of_which(self) -> str:
@@ -354,3 +354,8 @@ def _counts(gauge: Gauge, found: list[Reading]) -> str:
 def _free_name(kind: Kind, taken: tuple[Gauge, ...]) -> str:
     names, short = {gauge.name for gauge in taken}, TITLES[kind].split(" (")[0]
     return next(name for i in range(1, MOST_GAUGES + 2) if (name := f"{short} {i}") not in names)
+
+
+def _sentence(text: str) -> str:
+    """With a capital letter."""
+    return text[:1].upper() + text[1:]
