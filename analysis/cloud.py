@@ -33,6 +33,8 @@ UNITS = {
     "sigma_systematic": "m",
     "sigma_depth_random": "m",
     "sigma_depth_systematic": "m",
+    "sigma_surface_random": "m",
+    "sigma_surface_systematic": "m",
     "correlation_length": "rows",
     "error_depth": "m",
     "error_surface": "m",
@@ -61,6 +63,7 @@ MOST_BYTES = 2**36
 def cloud(points: Points, errors: Errors | None, laser: int, step: int, scene: Scene | None = None) -> Cloud:
     """Valid points of one laser and step; errors are NaN without `errors`. "row" is the scan line.
 
+    The sigmas of the surface are along its normal at the point, those of depth along the camera's axis.
     With `errors` the systematic sigmas hold, beside the calibration, the bias that the truth predicts of the sheet's
     own width, as one standard deviation; of photographs nobody knows it.
     With a scene whose objects move, x, y, z are carried back to step 0, so that the clouds of all steps fit together.
@@ -79,6 +82,8 @@ def cloud(points: Points, errors: Errors | None, laser: int, step: int, scene: S
         "sigma_systematic": np.hypot(points.sigma_systematic[here], np.linalg.norm(gradient, axis=1) * sheet),
         "sigma_depth_random": points.sigma_depth[here],
         "sigma_depth_systematic": np.hypot(points.sigma_depth_systematic[here], gradient[:, 2] * sheet),
+        "sigma_surface_random": nan if errors is None else errors.sigma_off_surface[here],
+        "sigma_surface_systematic": nan if errors is None else errors.systematic_off_surface[here],
         "correlation_length": points.correlation_length[here],
         "error_depth": nan if errors is None else errors.depth[here],
         "error_surface": nan if errors is None else errors.off_surface[here],

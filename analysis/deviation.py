@@ -146,6 +146,14 @@ def three_two_one(
     return Aligned(motion, used, 6)
 
 
+def sigma_of_deviation(random: Float, systematic: Float) -> Float:
+    """(m,) m, of a point's deviation: both parts along the normal; NaN where its chance is unknown.
+
+    The one sigma of report and window, as two would give the same points two verdicts.
+    """
+    return np.asarray(np.hypot(random, np.nan_to_num(systematic)))
+
+
 def verdicts(value: Float, sigma: Float, lower: float, upper: float) -> Verdicts:
     """(m,) by ISO 14253-1 with U = 2 sigma: proved within, proved beyond, or undecided, as where sigma is NaN."""
     uncertainty = 2.0 * sigma

@@ -40,6 +40,8 @@ class Errors:
     is matched."""
     sigma_off_surface: Float
     """Standard deviation of `off_surface`, m, predicted from sigma_u."""
+    systematic_off_surface: Float
+    """The same, m, by what the errors of neighbours have in common: calibration, motion, and the sheet's bias."""
     sheet_bias: Float
     """Part of `position`, px, that the sheet's width explains on curved surfaces and at edges, from the truth."""
     outlier: NDArray[np.bool_]
@@ -98,6 +100,7 @@ def compare(
     normals = triangle_normals(vertices, triangles, nearest)
     per_pixel = np.abs(np.einsum("ij,ij->i", points.gradient @ T_world_camera[:3, :3].T, normals))
     step = np.linalg.norm(points.gradient, axis=1)
+    common = systematic_along(points, normals @ T_world_camera[:3, :3], per_pixel * sheet_bias)
     wrong = outliers(position, 1.0, MATCH_SIGMAS * line.width[points.index, points.rank])
     where = points.index, points.rank
     valid_rows = np.unique(points.index[points.valid])
@@ -108,6 +111,7 @@ def compare(
         depth=depth,
         off_surface=off_surface,
         sigma_off_surface=per_pixel * points.sigma_pixel,
+        systematic_off_surface=common,
         sheet_bias=sheet_bias,
         outlier=wrong,
         u=measure(position, points.sigma_pixel, 1.0, *where),
@@ -118,6 +122,18 @@ def compare(
         measured_rows=len(np.unique(points.index[matched & ~wrong])),
         false_rows=len(np.setdiff1d(valid_rows, truth_rows)),
     )
+
+
+def systematic_along(points: Points, direction: Float, sheet: Float) -> Float:
+    """(m,) m, standard deviation along (m, 3) unit directions of the camera frame by calibration and motion.
+
+    sheet: (m,) m, the bias of the sheet's own width along them, taken as one standard deviation; NaN where unknown.
+    """
+    variance = np.nan_to_num(sheet) ** 2
+    for part in (points.calibration, points.motion):
+        if part is not None:
+            variance = variance + (np.einsum("mik,mi->mk", part, direction) ** 2).sum(axis=1)
+    return np.asarray(np.sqrt(variance))
 
 
 def match(index: Index, position: Float, true_index: NDArray[np.int32], true_position: Float) -> Index:

@@ -7,7 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from analysis.deviation import ABOVE, BELOW, FAR_OFF, UNDECIDED, WITHIN, far_off, verdict_of, verdicts
+from analysis.deviation import (
+    ABOVE,
+    BELOW,
+    FAR_OFF,
+    UNDECIDED,
+    WITHIN,
+    far_off,
+    sigma_of_deviation,
+    verdict_of,
+    verdicts,
+)
 from analysis.distance import nearest_triangle
 from analysis.report.deviation_figure import DeviationMap, draw
 from analysis.report.gauge_table import MARKS
@@ -156,8 +166,7 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
 
 
 def _sigma(rows: Any) -> Float:
-    """Of a point along the normal: its chance, NaN if it is not known, and the systematic part at most."""
-    return np.asarray(np.hypot(rows["sigma_off_surface"], np.nan_to_num(rows["sigma_systematic"])))
+    return sigma_of_deviation(rows["sigma_off_surface"], rows["systematic_off_surface"])
 
 
 def _map(report: ReportInput, rows: Any) -> str:
@@ -185,6 +194,7 @@ def _how(report: ReportInput, rows: Any) -> list[tuple[str, str]]:
             between = float(np.median(triangulation_angles(curve.point, origin)))
             found.append(("Triangulation angle (median)", degrees(between)))
     if len(rows):
-        sigma = _sigma(rows)
-        found.append(("Uncertainty of a point (two sigma, median)", micrometres(2.0 * float(np.median(sigma)))))
+        sigma = micrometres(2.0 * float(np.nanmedian(_sigma(rows))))
+        of = f"{count(len(rows))} points ({judged_objects(report)})"
+        found.append(("Uncertainty of a point, two sigma", f"{sigma} along the normal, median of {of}"))
     return found

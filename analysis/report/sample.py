@@ -27,12 +27,14 @@ ROW = np.dtype(
         ("position", "f8"), ("depth", "f8"), ("off_surface", "f8"), ("sheet_bias", "f8"),
         ("sigma_position", "f8"), ("sigma_depth", "f8"), ("sigma_off_surface", "f8"),
         ("pixel_depth", "f8"), ("pixel_distance", "f8"), ("sigma_systematic", "f8"), ("alike", "f8"), ("shared", "f8"),
+        ("systematic_off_surface", "f8"),
     ]
 )  # fmt: skip
 """Fields of a point: `index`, `rank`, `flag`, `width` (px) of its peak; whether it is `valid`; its position at step 0
 (`world`, m); its errors and their predicted sigma (px, m); the sheet's bias of the position (px); the errors in m for
 one pixel; the calibration's part of sigma in depth, m; the correlation length (`alike`), scan lines,
-of what is not the error in depth that narrow lines have in common (`shared`), m.
+of what is not the error in depth that narrow lines have in common (`shared`), m; and the part of sigma along the
+surface's normal that neighbours have in common, m.
 """
 
 MOST_LINES = 1 << 18
@@ -55,6 +57,7 @@ def rows_of(extraction: Extraction, scene: Scene, step: int) -> Rows:
     rows["sheet_bias"] = errors.sheet_bias
     rows["sigma_position"], rows["sigma_depth"] = points.sigma_pixel, points.sigma_depth
     rows["sigma_off_surface"] = errors.sigma_off_surface
+    rows["systematic_off_surface"] = errors.systematic_off_surface
     rows["sigma_systematic"] = points.sigma_depth_systematic
     rows["alike"] = 1.0 if line.length_apart is None else line.length_apart[points.index, points.rank]
     shared = 0.0 if line.shared_u is None else line.shared_u[points.index, points.rank]

@@ -82,7 +82,9 @@ def details(record: dict[str, Any]) -> list[str]:
         told.append(f"{percent(record['share_beyond'], 2)} of the points are out of the tolerance's band")
         told.append(f"{MARKS[record['verdict']]} by ISO 14253-1 with two sigma: {shares}")
     if record["median_sigma"] is not None:
-        told.append(f"A point's own sigma is {micrometres(record['median_sigma'])} at most (median)")
+        at_most = " at most" if record["sigma_is_bound"] else ""
+        size = f"{micrometres(2.0 * record['median_sigma'])}{at_most}"
+        told.append(f"Uncertainty of a point, two sigma: {size} along the normal, median of {record['points']} points")
     if record["points_left_out"]:
         told.append(f"{record['points_left_out']} points are of other objects")
     return told

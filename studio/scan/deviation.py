@@ -26,6 +26,7 @@ from analysis.deviation import (
     best_fit,
     deviations,
     far_off,
+    sigma_of_deviation,
     three_two_one,
     turn_and_shift,
     verdict_of,
@@ -54,6 +55,8 @@ MOST_POINTS = 5_000_000
 CHORD = 1e-5
 """m, of a STEP file whose points have no sigma."""
 TAKEN = ("x", "y", "z", "sigma_random", "sigma_systematic", "row", "laser", "step")
+ALONG_NORMAL = ("sigma_surface_random", "sigma_surface_systematic")
+"""Not in files of former versions, and not known of photographs."""
 NAMES = {BELOW: "below", WITHIN: "within", ABOVE: "above", UNDECIDED: "undecided"}
 
 
@@ -81,7 +84,7 @@ class Compared:
 
     found: Deviations
     sigma: Float
-    """(m,) m, of a point at most along the normal: of chance and of calibration together."""
+    """(m,) m, of a point along the normal: of chance and of calibration together."""
     verdicts: Verdicts | None
     """None: no tolerance was given."""
     columns: Cloud
@@ -95,6 +98,8 @@ class Compared:
     """That its file was read in; None: the part as it was scanned, or a file that tells it."""
     nominal_over_part: float = 1.0
     """Diagonals of their boxes."""
+    sigma_is_bound: bool = False
+    """Of some points the whole sigma is taken, as nobody knows their normal: at most that along it."""
 
     @property
     def record(self) -> dict[str, Any]:
@@ -134,6 +139,7 @@ class Compared:
             "rms_without_false": float(np.sqrt((value[~far] ** 2).mean())),
             "share_beyond": _share_beyond(value, self.question),
             "median_sigma": known(float(np.nanmedian(self.sigma)) if np.isfinite(self.sigma).any() else math.nan),
+            "sigma_is_bound": self.sigma_is_bound,
             "lower": self.question.lower,
             "upper": self.question.upper,
             "verdicts": counts,
@@ -156,7 +162,7 @@ def compare_cloud(scene: Scene, root: Path, cloud: Cloud, question: Question) ->
     if question.lower is not None and question.upper is not None and not question.upper > question.lower:
         raise InputError("the tolerance is empty", found=question.upper, allowed=f"above {question.lower}")
     points = np.column_stack([cloud[name] for name in "xyz"])
-    sigma = np.hypot(cloud["sigma_random"], np.nan_to_num(cloud["sigma_systematic"]))
+    sigma, known_normal = _sigma(cloud)
     vertices, triangles, here, part = _scanned(root, scene, points, question)
     size, unit = _diagonal(vertices, triangles), None
     if question.cad is not None and part is not None:
@@ -183,7 +189,8 @@ def compare_cloud(scene: Scene, root: Path, cloud: Cloud, question: Question) ->
         judged = verdicts(made.value, sigma, lower, math.inf if question.upper is None else question.upper)
     columns = {name: cloud[name][here] for name in ("laser", "step", "row")}
     towards = (eyes - points).mean(axis=0)
-    return Compared(made, sigma, judged, columns, question, towards, int(np.count_nonzero(~here)), unit, over_part)
+    others, is_bound = int(np.count_nonzero(~here)), not bool(known_normal[here].all())
+    return Compared(made, sigma, judged, columns, question, towards, others, unit, over_part, is_bound)
 
 
 def write_deviation(what: Compared, path: Path, reads: Sequence[Path] = ()) -> list[Path]:
@@ -236,6 +243,16 @@ def _scanned(
     return world.vertices, _whole(own), world.object_id[of] == index, objects[index]
 
 
+def _sigma(cloud: Cloud) -> tuple[Float, NDArray[np.bool_]]:
+    """(m,) m of a point along the normal, at most, and where it is that along it."""
+    whole = sigma_of_deviation(cloud["sigma_random"], cloud["sigma_systematic"])
+    if not all(name in cloud for name in ALONG_NORMAL):
+        return whole, np.zeros(len(whole), dtype=np.bool_)
+    along = sigma_of_deviation(*(cloud[name] for name in ALONG_NORMAL))
+    here = np.isfinite(along)
+    return np.where(here, along, whole), here
+
+
 def _diagonal(vertices: Float, triangles: Int) -> float:
     """Of the box about what has triangles, m."""
     return float(np.linalg.norm(np.ptp(vertices[np.unique(triangles)], axis=0))) if len(triangles) else 0.0
@@ -275,7 +292,7 @@ def read_cloud(path: Path) -> Cloud:
         if missing:
             raise InputError("the points lack columns", where=str(path), found=f"no {', '.join(missing)}")
         whole = np.isfinite(piece["x"] + piece["y"] + piece["z"])
-        pieces.append({name: piece[name][whole] for name in TAKEN})
+        pieces.append({name: piece[name][whole] for name in (*TAKEN, *ALONG_NORMAL) if name in piece})
         count += int(whole.sum())
         if count > MOST_POINTS:
             raise InputError("so many points are not compared", where=str(path), allowed=f"at most {MOST_POINTS}")

@@ -73,6 +73,7 @@ def test_what_the_truth_predicts_of_the_sheet_is_systematic_and_of_photographs_n
     bias = np.where(np.arange(70) % 2 == 0, np.nan, 0.3)
     nothing = np.full(70, np.nan)
     errors = SimpleNamespace(sheet_bias=bias, depth=nothing, off_surface=nothing)
+    errors.sigma_off_surface = errors.systematic_off_surface = nothing
     told, alone = cloud(points, errors, 0, 0), cloud(points, None, 0, 0)
     moved = 0.3 * np.abs(points.gradient[points.valid])
     unknown = np.isnan(bias[points.valid])
@@ -104,6 +105,7 @@ def test_the_table_names_its_units(tmp_path):
     write_csv(tmp_path / "p.csv", cloud(some_points(3), None, 0, 0))
     assert (tmp_path / "p.csv").read_text().splitlines()[0] == (
         "x_m,y_m,z_m,sigma_random_m,sigma_systematic_m,sigma_depth_random_m,sigma_depth_systematic_m,"
+        "sigma_surface_random_m,sigma_surface_systematic_m,"
         "correlation_length_rows,error_depth_m,error_surface_m,sheet_bias_px,u_px,v_px,row,laser,step"
     )
 

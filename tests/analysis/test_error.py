@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from analysis import distance
 from analysis.cloud import cloud
@@ -94,6 +95,23 @@ def test_what_the_sheet_adds_goes_with_the_point_that_its_crossing_is_matched_to
         np.testing.assert_equal(errors.sheet_bias[points.index == row], expected)
     table = cloud(points, errors, 0, 0)
     np.testing.assert_equal(table["sheet_bias"], errors.sheet_bias[points.valid])
+
+
+def test_what_the_calibration_moves_off_a_slanted_surface_is_the_spread_of_its_draws():
+    slanted = WALL @ Rotation.from_euler("xy", [0.2, -0.6]).as_matrix().T + np.array([0.0, 0.0, 0.2])
+    u = np.full((2048, 1), np.nan)
+    u[200:1800:40, 0] = 900.0
+    curve, random = wall_curve(np.arange(100, 1900)), np.random.default_rng(9)
+    line = line_of(u, 0.05)
+    points = triangulate(line, CAMERA, PLANE, T_rig_camera=np.eye(4), T_world_camera=np.eye(4))
+    by_calibration, by_motion = (2e-5 * random.standard_normal((len(points.flag), 3, k)) for k in (5, 2))
+    points = dataclasses.replace(points, calibration=by_calibration, motion=by_motion)
+    told = compare(points, line, curve, slanted, WALL_TRIANGLES, np.eye(4)).systematic_off_surface
+    moves, draws = np.concatenate([by_calibration, by_motion], axis=2), []
+    for draw in random.standard_normal((400, 7)):
+        draws.append(signed_distance(points.world + moves @ draw, slanted, WALL_TRIANGLES, np.zeros(3))[0])
+    np.testing.assert_allclose(np.std(draws, axis=0), told, rtol=5.0 / math.sqrt(2 * 400))
+    assert np.all(told < points.sigma_systematic), "what moves along the surface counts for nothing"
 
 
 def test_coverage_tells_an_honest_sigma_from_a_boastful_one():
