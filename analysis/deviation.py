@@ -47,6 +47,18 @@ def far_off(value: Float) -> NDArray[np.bool_]:
     return ~np.asarray(np.abs(value - np.nanmedian(value)) <= FAR * robust_sigma(value))
 
 
+def off_the_part(points: Float, value: Float, reach: float) -> NDArray[np.bool_]:
+    """(m,) that are far off, and have no point within `reach` m that is not: stray ones, where those of a dent are not.
+
+    Of a fine scan a dent is far off as well, but it begins where the others end.
+    """
+    apart = far_off(value)
+    if apart.any() and not apart.all():
+        distance, _ = scipy.spatial.cKDTree(points[~apart]).query(points[apart], distance_upper_bound=reach)
+        apart[apart] = ~np.isfinite(distance)
+    return apart
+
+
 @dataclass(frozen=True)
 class Aligned:
     """How the points were laid onto the surface."""

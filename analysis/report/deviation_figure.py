@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.deviation import callouts
+from analysis.deviation import callouts, far_off, off_the_part
 from analysis.report.colour import INK, MUTED
 from analysis.report.error_figures import nice_limit
 from analysis.report.labels import label_places, text_size
@@ -87,7 +87,8 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         drawing.grid(False)
         drawing.set(xlabel="mm", ylabel="mm")
         drawing.xaxis.set_major_locator(MaxNLocator(max(1, min(8, round(8.0 * wide / max(tall, 1e-9)))), integer=True))
-        drawing.set_title("Deviation from the nominal surface")
+        named, apart = _of_the_part(what, place)
+        drawing.set_title(f"Deviation from the nominal surface{_without_number(len(place) - len(named))}")
         fine = np.linspace(edges[0], edges[-1], 49) * 1e6
         counts, _ = np.histogram(clipped, fine)
         middle = (fine[1:] + fine[:-1]) / 2.0
@@ -99,18 +100,32 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         bars.set(ylabel="deviation (µm), + too much", xlabel="points", ylim=(fine[0], fine[-1]))
         bars.set_title("Bands")
         made.canvas.draw()  # where things are is known from here on
-        _point_at(drawing, what, place)
+        _point_at(drawing, what, place, named, apart)
         made.canvas.draw()
         return made
 
 
-def _point_at(axes: Any, what: DeviationMap, place: Float) -> None:
-    """The largest places, numbered, with their median deviation."""
+def _without_number(count: int) -> str:
+    if count == 0:
+        return ""
+    return f"\n{count} far-off point{' beside it has' if count == 1 else 's beside it have'} no number"
+
+
+def _of_the_part(what: DeviationMap, place: Float) -> tuple[NDArray[np.int64], float]:
+    """Which points are places of the part, and how far apart those that are numbered are at least, m."""
     if len(place) == 0:
+        return np.zeros(0, dtype=np.int64), 1.0
+    near = ~far_off(what.value)
+    extent = np.ptp(place[near] if near.any() else place, axis=0)
+    apart = 1e-3 * max(float(np.linalg.norm(extent)) / 6.0, 1e-6)
+    return np.flatnonzero(~off_the_part(what.points, what.value, apart)), apart
+
+
+def _point_at(axes: Any, what: DeviationMap, place: Float, named: NDArray[np.int64], apart: float) -> None:
+    """The largest places, numbered, with their median deviation."""
+    if len(named) == 0:
         return
-    low, high = place.min(axis=0), place.max(axis=0)
-    apart = 1e-3 * max(float(np.linalg.norm(high - low)) / 6.0, 1e-6)
-    found = callouts(what.points, what.value, CALLOUTS, apart)
+    found = [(int(named[i]), value) for i, value in callouts(what.points[named], what.value[named], CALLOUTS, apart)]
     texts = [f"{i}: {value * 1e6:+.{_places(value)}f} µm" for i, (_, value) in enumerate(found, 1)]
     px = axes.figure.dpi / 72.0  # of a typographic point
     anchors = axes.transData.transform(place[[i for i, _ in found]].reshape(-1, 2)) / px

@@ -27,6 +27,21 @@ def test_a_few_far_off_far_away_leave_the_bands_where_the_others_are() -> None:
     assert edges[0] == pytest.approx(-1e-4, rel=0.01) and edges[-1] == pytest.approx(1e-4, rel=0.01)
 
 
+@pytest.mark.parametrize("count", [0, 1, 7])
+def test_far_off_points_beside_the_part_are_counted_and_a_dent_is_pointed_at(count: int) -> None:
+    """A dent beyond six robust sigma is a place of the part, points hundreds of millimetres off it are none."""
+    x, y = (one.ravel() for one in np.meshgrid(np.linspace(0.0, 0.1, 200), np.linspace(0.0, 0.03, 60)))
+    random = np.random.default_rng(4)
+    value = 5e-6 * random.standard_normal(len(x))
+    value[np.hypot(x - 0.02, y - 0.015) < 0.01] = -3e-4
+    stray = random.choice(len(x), count, replace=False)
+    value[stray] = -np.linspace(0.1, 0.4, count)
+    made = draw(DeviationMap(np.column_stack([x, y, value]), value, UP, -5e-5, 5e-5))
+    assert [one.get_text() for one in made.axes[0].texts] == ["1: -300 µm"]
+    told = {0: "", 1: "1 far-off point beside it has no number", 7: "7 far-off points beside it have no number"}[count]
+    assert made.axes[0].get_title(loc="left").partition("\n")[2] == told
+
+
 @pytest.mark.parametrize("is_tall", [False, True])
 def test_a_dent_and_a_bump_are_pointed_at_with_their_size(is_tall: bool) -> None:
     x, y = (one.ravel() for one in np.meshgrid(np.linspace(0.0, 0.1, 200), np.linspace(0.0, 0.03, 60)))
