@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 
 from analysis.height_map import HeightMap, along, encoded, height_map
 from analysis.report.colour import method_colour
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.output.tone_mapping import pyramid
 from studio.editing.units import Unit
@@ -238,9 +239,7 @@ class HeightMapTab(QWidget):
         distance, height = along(self.made, start, end)
         self.profile.setData(1e3 * distance, 1e3 * height)
         self.plot.enableAutoRange()
-        known = height[np.isfinite(height)]
-        step = f", its ends differ by {1e3 * (known[-1] - known[0]):+.4f} mm" if len(known) > 1 else ""
-        self._line = f"Line of {1e3 * distance[-1]:.3f} mm{step}"
+        self._line = line_sentence(distance, height)
         self.read.setText(self._line)
 
     def _moved(self, event: tuple[QPointF]) -> None:
@@ -299,3 +298,17 @@ class HeightMapTab(QWidget):
         column.addWidget(self.read)
         column.addWidget(self.told)
         column.addStretch(0)
+
+
+def line_sentence(distance: Float, height: Float) -> str:
+    """How long a line across the map is, and by how much its ends differ; m, heights NaN where there is no surface."""
+    told = f"Line of {1e3 * distance[-1]:.3f} mm"
+    (known,) = np.nonzero(np.isfinite(height))
+    if len(known) < 2:
+        return told
+    first, last = known[0], known[-1]
+    differ = f"{1e3 * (height[last] - height[first]):+.4f} mm"
+    if first == 0 and last == len(height) - 1:
+        return f"{told}, its ends differ by {differ}"
+    between = f"{1e3 * (distance[last] - distance[first]):.3f} mm"
+    return f"{told}, its first and last height, {between} apart, differ by {differ}"

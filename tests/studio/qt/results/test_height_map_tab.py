@@ -19,7 +19,7 @@ from studio.project.document import Document, replaced
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Render, Session
-from studio.qt.results.height_map_tab import NOTHING, HeightMapTab
+from studio.qt.results.height_map_tab import NOTHING, HeightMapTab, line_sentence
 from studio.scan.deviation import read_cloud
 from studio.scan.first_range import height_range
 from studio.scan.height_map import file_range, read_points
@@ -104,6 +104,29 @@ def test_the_mouse_reads_a_cell_and_the_line_its_profile(tab: HeightMapTab) -> N
     np.testing.assert_allclose(z, 1e3 * height)
     assert height[0] == pytest.approx(made.heights[0, 0], nan_ok=True)
     assert distance[-1] == pytest.approx(made.pitch * np.hypot(columns - 1, rows - 1))
+
+
+def test_a_difference_of_heights_says_between_which_places_it_is(tab: HeightMapTab) -> None:
+    """Heights 72 mm apart were told as those of the ends of a line of 120 mm."""
+    distance = np.linspace(0.0, 0.12, 121)
+    height = 0.001 - 0.01 * distance
+    assert line_sentence(distance, height) == "Line of 120.000 mm, its ends differ by -1.2000 mm"
+    height[:30] = height[103:] = height[60] = np.nan
+    told = "Line of 120.000 mm, its first and last height, 72.000 mm apart, differ by -0.7200 mm"
+    assert line_sentence(distance, height) == told
+    height[:102] = np.nan
+    assert line_sentence(distance, height) == "Line of 120.000 mm"
+    # the tab says the same of its own line
+    made = tab.made
+    assert made is not None
+    heights = np.full_like(made.heights, np.nan)
+    tab.made = replace(made, heights=heights)
+    tab._show_profile()
+    assert "differ" not in tab.read.text()
+    columns = heights.shape[1]
+    heights[:, columns // 3 : columns // 2] = 0.01
+    tab._show_profile()
+    assert "its first and last height, " in tab.read.text() and "ends" not in tab.read.text()
 
 
 def test_what_it_writes_reads_back_as_what_it_shows(
