@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from analysis.gauges.gauge import TITLES, Gauge
+from analysis.gauges.gauge import TITLES, Gauge, Kind
 from analysis.report.units import NONE, digits
 
 COLUMNS = ("kind", "value", "sigma", "nominal", "tolerance", "verdict", "error", "error / sigma")
@@ -15,6 +15,13 @@ MARKS = {"pass": "✓\u00a0pass", "fail": "✗\u00a0fail", "undecided": "?\u00a0
 COUNTED = ("pass", "undecided", "fail", "no tolerance", "none")
 """Verdicts in the order in which their counts are told; the last: not measured."""
 PLAIN = str.maketrans({"µ": "u", "²": "2", "°": " deg", "–": "-", "✓": "", "✗": "", "?": "", "\u00a0": " "})  # noqa: RUF001
+DEFINITIONS: dict[Kind, str] = {
+    "straightness": "Straightness here is the bow: how far the middle of the parabola that is fitted to the region "
+    "stands over the line between its ends, signed; waves and roughness do not count, as they do by ISO 1101.",
+    "flatness": "Flatness here is the form of second degree (bow and twist) that is fitted to the surface, from peak "
+    "to valley over its least-squares plane; waves, dents and roughness do not count, as they do by ISO 1101.",
+}
+"""Of kinds whose name a drawing means otherwise, by a sentence each."""
 FEWEST, MOST = 2, 6
 """Digits after the point, of mm, mm² or degrees."""
 UNITS = {"m": (1e3, "\u00a0mm"), "rad": (math.degrees(1.0), "°"), "m2": (1e6, "\u00a0mm²")}
@@ -100,6 +107,12 @@ def counts_text(counts: Mapping[str, int]) -> str:
 def plain_cells(row: Mapping[str, Any]) -> list[str]:
     """The same for a terminal, which may know ASCII alone."""
     return [cell.translate(PLAIN).strip() for cell in cells(row)]
+
+
+def definitions(rows: list[dict[str, Any]]) -> list[str]:
+    """Of the kinds among the measures that need one, each once."""
+    kinds = {row["kind"] for row in rows}
+    return [text for kind, text in DEFINITIONS.items() if kind in kinds]
 
 
 def reasons(rows: list[dict[str, Any]]) -> list[str]:

@@ -123,6 +123,7 @@ def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None
         "details_left_out": f"{more} more lasers are in the tables below." if more > 0 else "",
         "gauge_columns": gauge_table.COLUMNS,
         "gauge_rows": [(row["name"], gauge_table.cells(row)) for row in report.measures],
+        "gauge_definitions": gauge_table.definitions(list(report.measures)),
         "gauge_note": report.measures_note,
         "gauge_reasons": gauge_table.reasons(list(report.measures)),
         "calibrations": calibrations,

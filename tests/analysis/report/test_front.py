@@ -114,6 +114,18 @@ def test_a_verdict_says_how_many_measures_it_is_of() -> None:
     assert told(none)["judged"] == "Of the surface (laser); the measures have no tolerance."
 
 
+def test_a_flatness_and_a_bow_are_defined_where_they_appear_and_only_there() -> None:
+    """A form of second degree from peak to valley is not what a drawing calls flatness."""
+    flat = {**gauge("pass"), "kind": "flatness"}
+    bow = {**gauge("pass"), "kind": "straightness"}
+    texts = {"flatness": "Flatness here is the form of second degree", "straightness": "Straightness here is the bow"}
+    for report in (make_report(), handed(customer="Ada")):
+        for rows in ((gauge("pass"),), (flat, flat), (bow, gauge("pass")), (flat, bow)):
+            page = render_page(replace(report, measures=rows))
+            for kind, text in texts.items():
+                assert page.count(text) == any(row["kind"] == kind for row in rows), (kind, len(rows))
+
+
 def test_the_mean_deviation_is_of_the_surface_and_far_off_are_counted() -> None:
     report = handed(customer="Ada")
     rows = report.record.chosen().rows
