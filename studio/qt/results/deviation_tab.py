@@ -50,7 +50,7 @@ ALL = "All objects"
 CHANGED = "Changed since: Compare again. The figures are still of what they name."
 ANOTHER = "Other points are shown since: Compare again."
 MARGIN = 8
-MOST_UM = 100_000.0
+FIRST_UM, MOST_UM = 100.0, 100_000.0
 SPOTS_HINT = "x,y,z of six places on the nominal, mm, world: three, two, one; between them semicolons"
 
 
@@ -64,6 +64,9 @@ class DeviationTab(QWidget):
         self._running: Job[tuple[Compared, QImage]] | None = None
         self.cad: Path | None = None
         self._picture = QPixmap()
+        self._given_part: str | None = None
+        self._given_limits: tuple[float | None, float | None] = None, None
+        """As the project's report had them last."""
         self.part = QComboBox()
         self.nominal = ElidedLabel(Qt.TextElideMode.ElideLeft)
         self.choose = text_button("File…", "A CAD file in the part's place: STEP, STL, PLY, OBJ, GLB")
@@ -79,7 +82,7 @@ class DeviationTab(QWidget):
         self.spots = QLineEdit()
         self.spots.setPlaceholderText("10,5,20; 40,5,20; …")
         self.spots.setToolTip(SPOTS_HINT)
-        self.least, self.most = _limit(-100.0), _limit(100.0)
+        self.least, self.most = _limit(-FIRST_UM), _limit(FIRST_UM)
         self.compare_button = text_button("Compare", "", "primary")
         self.export = text_button("Export as CSV…", "Every point, with map and figures beside it")
         self.in_view = QCheckBox("In 3D")
@@ -110,6 +113,7 @@ class DeviationTab(QWidget):
         self.export.clicked.connect(self._ask)
         for signal in (session.renders_changed, session.measured):
             signal.connect(self.refresh)
+        session.project_changed.connect(self._follow_delivery)
         runner.failed.connect(self._tell_failure)
         self.take_nominal(None)
         self.refresh()
@@ -122,6 +126,8 @@ class DeviationTab(QWidget):
         if wanted != [self.part.itemText(i) for i in range(self.part.count())]:
             self.part.clear()
             self.part.addItems(wanted)
+            self._given_part = None
+        self._follow_delivery()
         there = are_there(self.session)
         self.compare_button.setEnabled(there)
         running, self._running = self._running is not None, None
@@ -130,6 +136,19 @@ class DeviationTab(QWidget):
             self.told.setText(NOTHING)
         elif running:
             self.told.setText(ANOTHER)
+
+    def _follow_delivery(self) -> None:
+        """Object and limits as the project's report has them, so that both judge alike; a person's own stay."""
+        told = self.session.project.delivery
+        if told.surface_of != self._given_part:
+            self._given_part = told.surface_of
+            self.part.setCurrentIndex(max(0, self.part.findText(told.surface_of or ALL)))
+        limits = told.lower, told.upper
+        if limits != self._given_limits:
+            self._given_limits = limits
+            shown = limits if told.has_tolerance else (-1e-6 * FIRST_UM, 1e-6 * FIRST_UM)
+            for box, limit in zip((self.least, self.most), shown, strict=True):
+                box.setValue(box.minimum() if limit is None else 1e6 * limit)
 
     def take_nominal(self, file: Path | None) -> None:
         """A CAD file; None: the part as it was scanned."""

@@ -13,6 +13,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QMessageBox
 from pytestqt.qtbot import QtBot
 
+from analysis.report.delivery import Delivery
 from render.base.errors import InputError
 from studio.project.document import Document
 from studio.project.project import Project
@@ -20,6 +21,7 @@ from studio.qt.core.jobs import JobRunner
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.results import section_tab
+from studio.qt.results.deviation_tab import DeviationTab
 from studio.qt.results.nominal_panel import NominalPanel
 from studio.qt.viewport.error_cloud import ErrorCloud
 from studio.qt.viewport.view3d import View3D
@@ -71,6 +73,35 @@ def test_the_figures_are_those_of_the_command(
     tab.write(tmp_path / "d.csv")
     with open(tmp_path / "d.csv", newline="") as file:
         assert len(list(csv.DictReader(file))) == expected.record["points"]
+
+
+def test_it_begins_with_the_object_and_the_limits_of_the_report(
+    panel: NominalPanel, session: Session, qtbot: QtBot
+) -> None:
+    """The same points were judged by the report's limits there, and by others here."""
+    tab = panel.deviation
+    names = [tab.part.itemText(i) for i in range(tab.part.count())]
+    assert len(names) > 2 and tab.question().part is None
+    assert (tab.question().lower, tab.question().upper) == pytest.approx((-1e-4, 1e-4))
+    told = {"surface_of": names[1], "lower": -2e-4, "upper": 3e-4}
+    assert session.set(("delivery",), Delivery(**told))
+    other = DeviationTab(session, panel.deviation.runner)
+    qtbot.addWidget(other)
+    for one in (tab, other):
+        question = one.question()
+        assert question.part == names[1]
+        assert (question.lower, question.upper) == pytest.approx((-2e-4, 3e-4))
+    # what a person asks here stays until the report says otherwise
+    tab.part.setCurrentIndex(0)
+    tab.most.setValue(50.0)
+    session.set(("delivery", "customer"), "Ada")
+    session.measured.emit()
+    assert tab.question().part is None and tab.question().upper == pytest.approx(5e-5)
+    session.set(("delivery",), Delivery(surface_of=names[1], upper=4e-4))
+    assert tab.question().lower is None and tab.question().upper == pytest.approx(4e-4)
+    session.set(("delivery",), Delivery())
+    assert tab.question().part is None
+    assert (tab.question().lower, tab.question().upper) == pytest.approx((-1e-4, 1e-4))
 
 
 def test_a_mesh_is_read_in_the_unit_that_is_chosen(panel: NominalPanel, tmp_path: Path) -> None:
