@@ -81,3 +81,13 @@ def test_points_are_known_by_their_header(tmp_path: Path) -> None:
     write_ply(tmp_path / "points.ply", merge([]))
     write_csv(tmp_path / "points.csv", merge([]))
     check_replaceable([tmp_path / "points.ply", tmp_path / "points.csv", tmp_path / "not there.csv"])
+
+
+def test_points_of_the_version_without_sigmas_along_the_normal_may_be_replaced(tmp_path: Path) -> None:
+    former = {name: column for name, column in merge([]).items() if not name.startswith("sigma_surface")}
+    write_csv(tmp_path / "points.csv", former)
+    check_replaceable([tmp_path / "points.csv"])
+    del former["sheet_bias"]
+    write_csv(tmp_path / "points.csv", former)
+    with pytest.raises(InputError, match="did not write"):
+        check_replaceable([tmp_path / "points.csv"])
