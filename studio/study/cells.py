@@ -7,7 +7,9 @@ import itertools
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,15 +20,28 @@ from analysis.study.breakdown import Search, next_values
 from render.base.errors import InputError
 from render.sensor.sensor import Sensor
 from studio.project.project import MAX_SEED, Project
-from studio.study.boards import Boards, boards_of
+from studio.study.boards import PREFIX, Boards, boards_of
 from studio.study.effects import in_state
 from studio.study.kept import KEPT
-from studio.study.study import EFFECTS_FIELD, MOST_CELLS, SEARCHES, Study, Sweep, Value, check_part, with_fields
+from studio.study.study import (
+    EFFECTS_FIELD,
+    MOST_CELLS,
+    SEARCHES,
+    Study,
+    Sweep,
+    Value,
+    check_part,
+    field_place,
+    with_fields,
+)
 
 Point = tuple[Value, ...]
 """One value for each parameter of a sweep."""
 Rows = Mapping[str, Mapping[str, Any]]
 """Measured rows by the cell's key."""
+DIGITS = 12
+"""Of a number that is varied, by which its cells are named."""
+NOTHING: Mapping[str, tuple[Value, Value]] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -52,6 +67,8 @@ class Cell:
     """The render is likely to be asked for again: the next step of a search may share it."""
     kept: str = ""
     """What is kept of it for a chart: one of `kept.KEPT`."""
+    former_key: str = ""
+    """By the values to their last bit, as folders were written before; empty: it is the same."""
 
     @property
     def project(self) -> Project:
@@ -138,7 +155,9 @@ def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Se
         if state is not None:
             whole, varied = varied, in_state(varied, str(state))
             assumed = whole.sensor if varied.sensor != whole.sensor else None
-        names = _Names(varied.in_folder(base.folder), study.image_scale, boards, assumed)
+        meant = {p.field: (v, as_meant(v)) for p, v in zip(sweep.vary, point, strict=True) if v != as_meant(v)}
+        told = varied.in_folder(base.folder), study.image_scale, boards, assumed
+        names, former = _Names(*told, meant), _Names(*told) if meant else None
         seeds = [(varied.seed + repeat) % (MAX_SEED + 1) for repeat in range(study.repeats)]
         shared = [names.render_key(seed) for seed in seeds] if varied.render.goal is None else None
         again = sweep.sampling in SEARCHES and shared is not None
@@ -146,9 +165,19 @@ def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Se
             kept = sweep.chart if sweep.chart in KEPT and repeat == 0 else ""
             key = names.key(method, seed, kept)
             render_key = key if shared is None else shared[repeat]
-            yield Cell(
-                number, point, method, repeat, seed, names.project, key, render_key, boards, assumed, again, kept
-            )
+            of_point = number, point, method, repeat, seed, names.project, key, render_key, boards, assumed, again, kept
+            yield Cell(*of_point, "" if former is None else former.key(method, seed, kept))
+
+
+def as_meant(value: Value) -> Value:
+    """A number as a person means it: the same one in every range, whose arithmetic differs in the last bits."""
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+
+
+def row_of(cell: Cell, rows: Rows) -> Mapping[str, Any] | None:
+    """What is measured of a cell; None: it is not."""
+    found = rows.get(cell.key)
+    return found if found is not None or not cell.former_key else rows.get(cell.former_key)
 
 
 def next_cells(study: Study, bases: Mapping[str, Project], rows: Rows, shard: Shard = WHOLE) -> list[Cell]:
@@ -165,7 +194,7 @@ def next_cells(study: Study, bases: Mapping[str, Project], rows: Rows, shard: Sh
         for method in methods_of(study, sweep):
             for cell in next_of_search(study, number, method, bases, rows):
                 found.setdefault(cell.key, cell)
-    return [cell for key, cell in found.items() if key not in rows and shard.holds(cell.part_key(study))]
+    return [cell for cell in found.values() if row_of(cell, rows) is None and shard.holds(cell.part_key(study))]
 
 
 def next_of_search(study: Study, number: int, method: str, bases: Mapping[str, Project], rows: Rows) -> list[Cell]:
@@ -214,17 +243,32 @@ def _repeats(
     limit = study.sweeps[number].limit
     assert limit is not None
     cells = [cell for cell in cells_at(study, number, bases, [point]) if cell.method == method]
-    if not all(cell.key in rows for cell in cells):
+    measured = [row for row in (row_of(cell, rows) for cell in cells) if row is not None]
+    if len(measured) < len(cells):
         return None
-    return np.array([rows[cell.key][limit.measure] for cell in cells], dtype=np.float64)
+    return np.array([row[limit.measure] for row in measured], dtype=np.float64)
 
 
 class _Names:
     """Keys of a point's cells. What the point decides is put into words once: a study may have a million cells."""
 
-    def __init__(self, project: Project, image_scale: float, boards: Boards | None, assumed: Sensor | None) -> None:
+    def __init__(
+        self,
+        project: Project,
+        image_scale: float,
+        boards: Boards | None,
+        assumed: Sensor | None,
+        meant: Mapping[str, tuple[Value, Value]] = NOTHING,
+    ) -> None:
+        """meant: by field what it is, and the number by which it is named."""
         self.project = project
         data = {**project.model_dump(mode="json"), "image_scale": image_scale}
+        on_boards = {} if boards is None else {"boards": boards.model_dump(mode="json")}
+        for field, (value, named) in meant.items():
+            with suppress(InputError):  # a value may have become another field's, which is named to its last bit
+                place, part = field_place(on_boards if field.startswith(PREFIX) else data, field, field)
+                if place[part] == value:
+                    place[part] = named
         del data["name"], data["schema_version"]
         self.extraction = data["extraction"]
         self.whole = {name: _words(value) for name, value in data.items()}
@@ -234,7 +278,7 @@ class _Names:
         self.light["axis"] = _words(self.extraction["axis"])
         del self.light["sensor"], self.light["extraction"]
         if boards is not None:
-            self.whole["boards"] = _words(boards.model_dump(mode="json"))
+            self.whole["boards"] = _words(on_boards["boards"])
         if assumed is not None:
             self.whole["assumed"] = _words(assumed.model_dump(mode="json"))
 

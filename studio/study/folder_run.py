@@ -15,7 +15,7 @@ from studio.scan.folder_lock import hold
 from studio.study.answers import Answer, answers
 from studio.study.as_begun import begun_in
 from studio.study.begin import begin
-from studio.study.cells import Cell, cells_at
+from studio.study.cells import Cell, cells_at, row_of
 from studio.study.store import Row, Store, described
 from studio.study.study import Study
 from studio.study.tables import values_of, write_tables
@@ -42,12 +42,11 @@ class Found:
         """The cell behind a spot of a sweep's chart: of its repeats the one that is nearest to their mean."""
         answer = self.answers[number]
         shown, name = answer.spots[spot], answer.sweep.measure
-        cells = [
-            cell
-            for cell in cells_at(self.study, number, self.bases, [shown.point])
-            if cell.method == shown.method and cell.key in self.rows
-        ]
-        apart = abs(values_of([self.rows[cell.key] for cell in cells], name) - shown.measure.mean)
+        asked = cells_at(self.study, number, self.bases, [shown.point])
+        there = [(cell, row_of(cell, self.rows)) for cell in asked if cell.method == shown.method]
+        measured = [(cell, row) for cell, row in there if row is not None]
+        apart = abs(values_of([row for _, row in measured], name) - shown.measure.mean)
+        cells = [cell for cell, _ in measured]
         return min(zip(apart, cells, strict=True), key=lambda pair: (not pair[0] >= 0.0, pair[0]))[1]
 
 

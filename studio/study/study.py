@@ -280,7 +280,8 @@ def with_fields(project: Project, values: dict[str, Value], where: str) -> Proje
     """
     data = project.model_dump(mode="json")
     for path, value in of_project(values).items():
-        _set(data, path, value, where)
+        place, part = field_place(data, path, where)
+        place[part] = value
     return Project.from_data(data, where).in_folder(project.folder)
 
 
@@ -306,13 +307,14 @@ def parts_of(path: str) -> list[str | int]:
     return [int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", path)]
 
 
-def _set(data: dict[str, Any], path: str, value: Value, where: str) -> None:
+def field_place(data: dict[str, Any], path: str, where: str) -> tuple[Any, str | int]:
+    """What holds a field of a project's data, and the field's name or index there. InputError: no such field."""
     parts = parts_of(path)
     place: Any = data
     for part in parts[:-1]:
         place = _child(place, part, path, where)
     _child(place, parts[-1] if parts else "", path, where)
-    place[parts[-1]] = value
+    return place, parts[-1]
 
 
 def _child(place: Any, part: str | int, path: str, where: str) -> Any:

@@ -15,7 +15,7 @@ import numpy as np
 
 from render.base.files import atomic_write
 from studio.project.project import Project
-from studio.study.cells import Cell, Point, cells_at, methods_of, points, searched
+from studio.study.cells import Cell, Point, cells_at, methods_of, points, row_of, searched
 from studio.study.measures import MEASURES, part_names
 from studio.study.ray_units import MILLION, RAY_SPEED
 from studio.study.store import Row
@@ -40,8 +40,9 @@ def measured_cells(
         wanted = {method: sorted(searched(study, number, method, bases, rows)) for method in methods_of(study, sweep)}
     for method, found in wanted.items():
         for cell in cells_at(study, number, bases, found):
-            if cell.key in rows and method in (None, cell.method):
-                yield cell, rows[cell.key]
+            row = row_of(cell, rows)
+            if row is not None and method in (None, cell.method):
+                yield cell, dict(row)
 
 
 def write_tables(folder: Path, study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> list[Path]:

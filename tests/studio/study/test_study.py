@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from render.base.errors import InputError
 from studio.project.project import Project
 from studio.study.cells import cells_at, check_size, next_cells, points
 from studio.study.study import Study, ready_made, with_fields
+from studio.study.tables import measured_cells
 
 SWEEP: dict[str, Any] = {"name": "a", "vary": [{"field": "sensor.exposure_time", "values": [0.001, 0.002]}]}
 
@@ -119,6 +121,41 @@ def test_more_values_methods_or_repeats_keep_the_keys_that_are_there() -> None:
     keys = {cell.key for cell in next_cells(small, bases_of(small), {})}
     assert keys < {cell.key for cell in next_cells(large, bases_of(large), {})}
     assert small.digest(bases_of(small)) == large.digest(bases_of(large))
+
+
+def in_range(low: float, high: float, count: int, spacing: str, field: str = "scene.rig.lasers[0].power") -> Study:
+    return study_of(
+        {"name": "a", "vary": [{"field": field, "low": low, "high": high, "count": count, "spacing": spacing}]}
+    )
+
+
+@pytest.mark.parametrize(
+    ("small", "large"),
+    [
+        ((0.01, 0.04, 3, "logarithmic"), (0.01, 0.08, 4, "logarithmic")),
+        ((0.01, 0.1, 4, "linear"), (0.01, 0.19, 7, "linear")),
+        ((math.radians(10), math.radians(40), 4, "linear", "boards.most_tilt"),
+         (math.radians(10), math.radians(80), 8, "linear", "boards.most_tilt")),
+    ],
+)  # fmt: skip
+def test_a_range_that_is_extended_keeps_the_cells_that_are_there(
+    small: tuple[Any, ...], large: tuple[Any, ...]
+) -> None:
+    fewer, more = in_range(*small), in_range(*large)
+    assert not set(points(fewer.sweeps[0])) <= set(points(more.sweeps[0])), "they differ in the last bits"
+    rows = {cell.key: {} for cell in next_cells(fewer, bases_of(fewer), {})}
+    left = next_cells(more, bases_of(more), rows)
+    assert {cell.point for cell in left} == set(points(more.sweeps[0])[small[2] :])
+
+
+def test_cells_that_were_named_by_every_bit_of_their_values_are_still_known() -> None:
+    study = in_range(0.01, 0.08, 7, "logarithmic")
+    cells = next_cells(study, bases_of(study), {})
+    long = [point for point in points(study.sweeps[0]) if float(f"{point[0]:.12g}") != point[0]]
+    assert sum(bool(cell.former_key) for cell in cells) == 3 * len(long) > 0
+    rows = {cell.former_key or cell.key: {} for cell in cells}
+    assert next_cells(study, bases_of(study), rows) == []
+    assert len(list(measured_cells(study, 0, bases_of(study), rows))) == len(cells)
 
 
 def test_quasi_random_points_fill_their_ranges_and_are_the_same_each_time() -> None:
