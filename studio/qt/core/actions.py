@@ -122,6 +122,7 @@ COMMANDS: tuple[Command | str, ...] = (
     Command(
         "scan", "Render", "Run the whole &scan…", "Ctrl+F5", "", "Every step of the motion, with points and report"
     ),
+    Command("resume_scan", "Render", "Res&ume the scan", "", "", "Go on with the scan that was stopped, as it began"),
     Command("previous_line", "Measure", "&Previous scan line", "Alt+Up"),
     Command("next_line", "Measure", "&Next scan line", "Alt+Down"),
     Command("worst_line", "Measure", "&Worst scan line", "Alt+W", "", "Where the error is largest"),

@@ -66,6 +66,8 @@ class MotionPanel(QWidget):
     """A `Cloud`: the points of one more step of the running scan."""
     began = Signal(float)
     """A scan began, at this image scale: what was shown of an earlier one goes."""
+    stopped_changed = Signal()
+    """`stopped` is another one."""
     _measured = Signal(object, object)
 
     def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
@@ -167,6 +169,7 @@ class MotionPanel(QWidget):
             )
 
         self.stopped = None
+        self.stopped_changed.emit()
         for button in (self.open, self.go_on):
             button.hide()
         self.began.emit(order.image_scale)
@@ -209,12 +212,14 @@ class MotionPanel(QWidget):
                 f"Go on at {size}, as it began, whatever is chosen now, where the scan into {order.folder} was stopped"
             )
             self.go_on.show()
-            told = f"The scan was stopped; Resume in Motion goes on at {size}: {order.folder}"
+            self.stopped_changed.emit()
+            told = f"The scan was stopped; Render > Resume the scan goes on at {size}: {order.folder}"
             self.session.message.emit("info", told)
 
     def _forget(self) -> None:
         """Another project was opened: what was scanned of the one before goes."""
         self.report = self.stopped = None
+        self.stopped_changed.emit()
         for button in (self.open, self.go_on):
             button.hide()
 

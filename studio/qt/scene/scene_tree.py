@@ -6,7 +6,7 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QSize, Qt, QTimer
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QColor,
     QContextMenuEvent,
@@ -47,6 +47,7 @@ from studio.qt.scene.scene_nodes import Node, nodes
 
 PATH, DETAIL = Qt.ItemDataRole.UserRole, Qt.ItemDataRole.UserRole + 1
 NAME, EYE = 0, 1
+MOTION = ("scene", "motion")
 
 
 class _Delegate(QStyledItemDelegate):
@@ -91,6 +92,9 @@ class _Delegate(QStyledItemDelegate):
 class SceneTree(QTreeWidget):
     """The tree of the session's project; shares the selection, of several items with Ctrl or Shift."""
 
+    motion_clicked = Signal()
+    """The motion has a panel of its own, beside its fields in the inspector."""
+
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.session = session
@@ -124,6 +128,7 @@ class SceneTree(QTreeWidget):
         session.document_replaced.connect(self.expandAll)
         self.itemSelectionChanged.connect(self._selected)
         self.itemChanged.connect(self._renamed)
+        self.itemClicked.connect(lambda item, _column: self.motion_clicked.emit() if _path(item) == MOTION else None)
         self.itemDoubleClicked.connect(lambda _item, _column: session.frame_requested.emit())
         self.refresh()
 
@@ -274,7 +279,7 @@ class SceneTree(QTreeWidget):
             self._item_entries(menu, path)
         elif path in (LASERS, OBJECTS, LIGHTS):
             scene_actions.fill_add_menu(menu.addMenu("Add"), session, self, str(path[-1]))
-        elif path == ("scene", "motion"):
+        elif path == MOTION:
             scene_actions.fill_motion_menu(menu, session)
         else:
             if path == ():

@@ -39,6 +39,7 @@ from studio.qt.shell.file_actions import FileActions
 from studio.qt.shell.going import what_goes
 from studio.qt.shell.help import Help, panel_with_focus
 from studio.qt.shell.memory import return_what_is_free
+from studio.qt.shell.motion_calls import join_motion
 from studio.qt.shell.panels import PANELS, Making, Panels
 from studio.qt.shell.preferring import Preferring
 from studio.qt.shell.shortcuts import CheatSheet
@@ -278,7 +279,6 @@ class MainWindow(QMainWindow):
             "expose": self.panels["develop"].expose,  # type: ignore[attr-defined]
             "pause": self.status.toggle_pause,
             "cancel": self.status.cancel_work,
-            "scan": self._scan,
             "frame_points": lambda: self.cloud.frame(),
             "log": lambda: self.show_panel("log"),
             "help": lambda: self.help.open_page(panel_with_focus(self.panels, self.workspace)),
@@ -289,6 +289,7 @@ class MainWindow(QMainWindow):
         }
         for key, handler in handlers.items():
             self.commands.connect(key, handler)
+        join_motion(self.panels, self.commands, self.call_panel)
         for key, command in SWITCH.items():
             self.commands.connect(command, partial(self.switch_to, key))
         themes = QActionGroup(self)
@@ -322,10 +323,6 @@ class MainWindow(QMainWindow):
     def _rename(self) -> None:
         self.show_panel("scene")
         self.panels["scene"].rename_selection()  # type: ignore[attr-defined]
-
-    def _scan(self) -> None:
-        self.call_panel("motion")
-        self.panels["motion"].ask_and_run()  # type: ignore[attr-defined]
 
     def _vary(self, path: FieldPath, spec: FieldSpec) -> None:
         from studio.qt.study.study_work import StudyWork

@@ -1,0 +1,63 @@
+"""The Motion panel comes where it is called for, and a scan that was stopped goes on by the menu."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from render.base.errors import Cancelled
+from studio.qt.render.motion_panel import MotionPanel
+from studio.qt.shell.window import MainWindow
+from studio.qt.shell.workspaces import WORKSPACES
+from studio.scan.options import ScanOptions
+
+MOTION = ("scene", "motion")
+
+
+def click_in_tree(window: MainWindow, qtbot: QtBot, path: tuple[str | int, ...]) -> None:
+    tree = window.panels["scene"]
+    place = tree.visualItemRect(tree.item(path)).center()  # type: ignore[attr-defined]
+    qtbot.mouseClick(tree.viewport(), Qt.MouseButton.LeftButton, pos=place)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("workspace", [each.key for each in WORKSPACES])
+def test_f6_and_a_click_on_motion_bring_its_panel(window: MainWindow, qtbot: QtBot, workspace: str) -> None:
+    window.switch_to(workspace)
+    qtbot.keyClick(window, Qt.Key.Key_F6)
+    assert window.docks["motion"].isHidden()
+    click_in_tree(window, qtbot, MOTION)
+    panel = window.panels["motion"]
+    qtbot.waitUntil(lambda: not panel.visibleRegion().isEmpty())
+    assert window.session.selection == MOTION and window.docks["inspector"].isVisible()
+    click_in_tree(window, qtbot, ())
+    assert panel.isVisible(), "it stays until another workspace is shown"
+    window.switch_to("measure")
+    assert window.docks["motion"].isHidden()
+
+
+def test_a_scan_that_was_stopped_goes_on_as_the_message_says(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[bool] = []
+
+    def scan(*_: object, options: ScanOptions, **others: object) -> object:
+        asked.append(options.resume)
+        raise Cancelled
+
+    monkeypatch.setattr("studio.scan.scan.run_scan", scan)
+    motion, command = window.panels["motion"], window.commands["resume_scan"]
+    assert isinstance(motion, MotionPanel) and not command.isEnabled()
+    window.switch_to("measure")
+    told = "Render > Resume the scan"
+    with qtbot.waitSignal(window.session.message, check_params_cb=lambda _level, text: told in text):
+        motion.run_into(tmp_path / "scan")
+    assert command.isEnabled()
+    with qtbot.waitSignal(window.runner.cancelled):
+        command.trigger()
+    assert asked == [False, True] and motion.isVisible()
+    assert motion.stopped is not None
+    window.files.replace(motion.stopped.document)
+    assert not command.isEnabled(), "another project was opened"
