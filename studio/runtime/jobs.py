@@ -74,6 +74,8 @@ class Job(Generic[Result]):
         self.on_end = on_end
         self.stage = ""
         self.done = 0.0
+        self.there = 0.0
+        """Share of the work that an earlier run has done: it is found in no time, which is no measure of the rest."""
         self.result: Result | None = None
         self.problem: Problem | None = None
         self._work = work
@@ -108,7 +110,7 @@ class Job(Generic[Result]):
     def seconds_left(self) -> float | None:
         """Estimated from the progress; None while that says too little."""
         enough = 0.01 if self.seconds >= LONG_WORK else SMALL_SHARE
-        if self.ended or self.done < enough or self.seconds < EARLIEST_ESTIMATE:
+        if self.ended or self.done - self.there < enough * (1.0 - self.there) or self.seconds < EARLIEST_ESTIMATE:
             return None
         begun, first = self._begun
         if self.done <= first:
@@ -165,7 +167,9 @@ class Job(Generic[Result]):
         done = min(max(done, 0.0), 1.0)
         if done != self.done:
             self._told = self.seconds
-            if self.done == 0.0 and self._told > LONG_START:
+            if done <= self.there:
+                self._begun = self._told, done
+            elif self.done == 0.0 and self._told > LONG_START:
                 self._begun = self._told, done  # until then workers started, which the rest does not do again
         self.stage, self.done = stage, done
 

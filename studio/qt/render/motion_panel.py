@@ -35,7 +35,7 @@ from studio.qt.core.step_bar import StepBar
 from studio.runtime.console import FRAMES, frame_of
 from studio.runtime.jobs import Job, Progress
 from studio.scan.options import Listener, ScanOptions
-from studio.scan.scan_folder import open_folder
+from studio.scan.scan_folder import frame_stem, open_folder
 from studio.scan.scan_results import holds_scan, is_unfinished
 from studio.scan.stages import scaled
 
@@ -113,7 +113,9 @@ class MotionPanel(QWidget):
         self._follow_step()
 
     def ask_and_run(self) -> None:
-        """Ask for the folder of the results, then run the scan."""
+        """Ask for the folder of the results, then run the scan; while something is rendered, nothing is asked."""
+        if self._is_busy():
+            return  # the folder that a person chooses is made
         start = self.session.document.path
         place = start.parent if start is not None else Path.home()
         name = unused_name(place, f"{self.session.project.name} scan")
@@ -134,9 +136,15 @@ class MotionPanel(QWidget):
         """Go on with the scan that was stopped, as it was asked for, whatever has changed in the project since."""
         return None if self.stopped is None else self._start(self.stopped, resume=True)
 
-    def _start(self, order: Order, resume: bool) -> Job[ScanResult] | None:
-        if self.runner.job(RENDER) is not None:
+    def _is_busy(self) -> bool:
+        """Something else is being rendered: the person is told."""
+        busy = self.runner.job(RENDER) is not None
+        if busy:
             self.session.message.emit("warning", BUSY)
+        return busy
+
+    def _start(self, order: Order, resume: bool) -> Job[ScanResult] | None:
+        if self._is_busy():
             return None
         count, source = order.project.scene.frame_count, order.document.path
 
@@ -145,6 +153,8 @@ class MotionPanel(QWidget):
                 best = laser.extractions[0]
                 points = cloud(best.points, best.errors, i, frame.step, order.project.scene)
                 self._measured.emit(order, points)
+
+        there = frames_there(order.folder, count) if resume else 0
 
         def work(progress: Progress, cancelled: Cancel) -> ScanResult:
             from studio.scan.scan import run_scan  # takes a while: not before a scan
@@ -174,6 +184,7 @@ class MotionPanel(QWidget):
             button.hide()
         self.began.emit(order.image_scale)
         job = self.runner.run(RENDER, "scan", work, lambda result: self._done(result, order))
+        job.there = share(FRAMES, there / count) or 0.0 if there else 0.0
         self._running = job, order
         return job
 
@@ -265,6 +276,11 @@ class MotionPanel(QWidget):
         self.stack = QStackedLayout(self)
         self.stack.addWidget(still)
         self.stack.addWidget(moving)
+
+
+def frames_there(folder: Path, count: int) -> int:
+    """Of the first frames of a scan, those that an earlier run has left in its folder."""
+    return next((i for i in range(count) if not (folder / f"{frame_stem(i)}.json").is_file()), count)
 
 
 def share(stage: str, done: float) -> float | None:

@@ -186,6 +186,32 @@ def test_a_long_start_is_not_taken_for_the_pace_of_the_rest(monkeypatch: pytest.
     job.join()
 
 
+def test_what_an_earlier_run_has_done_is_no_measure_of_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of a scan's frames were there and found in a second: the other half, of 10 s each, was foretold as one."""
+    clock = [0.0]
+    monkeypatch.setattr(jobs, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    reports, told = [threading.Event() for _ in range(4)], threading.Semaphore(0)
+
+    def work(progress: Progress, cancelled: Cancel) -> None:
+        for report, (seconds, done) in zip(reports, [(0.5, 0.25), (1.0, 0.5), (11.0, 0.6), (21.0, 0.7)], strict=True):
+            report.wait(180)
+            clock[0] = seconds
+            progress("frames", done)
+            told.release()
+
+    job = Job("scan", work)
+    job.there = 0.5
+    job.start()
+    left = []
+    for report in reports[:3]:
+        report.set()
+        assert told.acquire(timeout=180)
+        left.append(job.seconds_left)
+    assert left == [None, None, pytest.approx(40.0)]
+    reports[3].set()
+    job.join()
+
+
 def test_bad_input_is_told_in_its_own_words() -> None:
     def work(progress: Progress, cancelled: Cancel) -> None:
         raise InputError("the mesh is missing", where="part.stl", cure="choose the file again")

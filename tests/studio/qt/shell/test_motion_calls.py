@@ -9,10 +9,15 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from render.base.errors import Cancelled
+from render.scene.motion import LinearStage
+from studio.qt.core.jobs import BUSY, RENDER
+from studio.qt.render import motion_panel
 from studio.qt.render.motion_panel import MotionPanel
 from studio.qt.shell.window import MainWindow
 from studio.qt.shell.workspaces import WORKSPACES
-from studio.scan.options import ScanOptions
+from studio.runtime.console import FRAMES
+from studio.scan.options import Listener, ScanOptions
+from tests.studio.qt.shell.window_hands import until_cancelled
 
 MOTION = ("scene", "motion")
 
@@ -61,3 +66,38 @@ def test_a_scan_that_was_stopped_goes_on_as_the_message_says(
     assert motion.stopped is not None
     window.files.replace(motion.stopped.document)
     assert not command.isEnabled(), "another project was opened"
+
+
+def test_the_frames_that_are_there_do_not_foretell_the_time_left(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def scan(*_: object, listener: Listener, **__: object) -> None:
+        until_cancelled(listener.progress, listener.cancelled)
+
+    monkeypatch.setattr("studio.scan.scan.run_scan", scan)
+    motion = window.panels["motion"]
+    assert isinstance(motion, MotionPanel)
+    window.session.set(("scene", "motion"), LinearStage(step=(0.001, 0.0, 0.0), steps=4))
+    for expected in (0.0, motion_panel.share(FRAMES, 0.5)):
+        job = motion.run_into(tmp_path) if motion.stopped is None else motion.resume()
+        assert job is not None and job.there == expected
+        for i in (0, 1, 3):
+            (tmp_path / f"frame_{i:04d}.json").touch()
+        with qtbot.waitSignal(window.runner.cancelled):
+            window.runner.cancel(RENDER)
+    window.files.count_as_saved(window.session.project)
+
+
+def test_no_folder_is_asked_for_and_made_while_something_is_rendered(
+    window: MainWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[object] = []
+    monkeypatch.setattr(motion_panel, "ask_results_folder", lambda *given: asked.append(given))
+    window.runner.run(RENDER, "render", until_cancelled)
+    with qtbot.waitSignal(window.session.message, check_params_cb=lambda _level, text: text == BUSY):
+        window.commands["scan"].trigger()
+    assert not asked
+    with qtbot.waitSignal(window.runner.cancelled):
+        window.runner.cancel(RENDER)
+    window.commands["scan"].trigger()
+    assert len(asked) == 1
