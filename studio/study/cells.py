@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from studio.study.study import (
 
 Point = tuple[Value, ...]
 """One value for each parameter of a sweep."""
+R = TypeVar("R")
 Rows = Mapping[str, Mapping[str, Any]]
 """Measured rows by the cell's key."""
 DIGITS = 12
@@ -174,7 +175,7 @@ def as_meant(value: Value) -> Value:
     return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 
-def row_of(cell: Cell, rows: Rows) -> Mapping[str, Any] | None:
+def row_of(cell: Cell, rows: Mapping[str, R]) -> R | None:
     """What is measured of a cell; None: it is not."""
     found = rows.get(cell.key)
     return found if found is not None or not cell.former_key else rows.get(cell.former_key)

@@ -42,7 +42,7 @@ def measured_cells(
         for cell in cells_at(study, number, bases, found):
             row = row_of(cell, rows)
             if row is not None and method in (None, cell.method):
-                yield cell, dict(row)
+                yield cell, row
 
 
 def write_tables(folder: Path, study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> list[Path]:

@@ -116,6 +116,9 @@ def palette(c: Colours) -> QPalette:
     faded = mixed(c.text, c.window, 0.45)
     for which in (role.WindowText, role.Text, role.ButtonText):
         made.setColor(group.Disabled, which, QColor(faded))
+    # a field that takes nothing is no well to type into
+    made.setColor(group.Disabled, role.Base, QColor(c.window))
+    made.setColor(group.Disabled, role.PlaceholderText, QColor(faded))
     made.setColor(group.Disabled, role.Highlight, QColor(c.line))
     return made
 
@@ -124,6 +127,7 @@ def outlined(c: Colours) -> QPalette:
     """The palette of controls that are an outline: Fusion draws it a good part darker than the window's colour."""
     made = palette(c)
     made.setColor(QPalette.ColorRole.Window, QColor(c.edge).lighter(FUSION_DARKER))
+    made.setColor(QPalette.ColorGroup.Disabled, QPalette.ColorRole.Window, QColor(c.line).lighter(FUSION_DARKER))
     return made
 
 

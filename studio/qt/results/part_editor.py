@@ -12,7 +12,7 @@ from analysis.gauges.gauge import Gauge
 from render.base.errors import InputError
 from studio.editing.forms import describe_item
 from studio.editing.units import Unit
-from studio.project.document import FieldPath
+from studio.project.document import FieldPath, value_at
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import keep_room
 from studio.qt.forms.fields import TextField, reason
@@ -21,6 +21,9 @@ from studio.qt.forms.number_field import NumberField
 LIMITS = ("lower", "upper")
 FIELDS = ("name", "nominal", *LIMITS)
 NOMINAL_FIRST = "Give the nominal first: what is allowed is a deviation from it"
+IDEALLY_ZERO = ("flatness", "straightness", "flush")
+"""Kinds of which every drawing means 0, and gives the tolerance alone."""
+NOMINAL_ZERO = "The nominal becomes 0, as drawings mean it where they give a tolerance alone"
 
 
 class PartEditor(QWidget):
@@ -43,6 +46,8 @@ class PartEditor(QWidget):
         for column, share in enumerate((4, 3, 3, 3)):
             self._grid.setColumnStretch(column, share)
         self._made_for: tuple[FieldPath, str] = (), ""
+        self._ideal: float | None = None
+        """The nominal of a measure that has none, once a tolerance is given; None: a person has to say it."""
         self._dragged = False
         self._given_up = ""
         """Why what was typed was dropped, as its field is about to be left."""
@@ -56,14 +61,20 @@ class PartEditor(QWidget):
         if self._made_for != (self.path, gauge.unit):
             self._made_for = self.path, gauge.unit
             self._make(gauge)
+        self._ideal = 0.0 if gauge.kind in IDEALLY_ZERO else None
         for name, field in self.fields.items():
             field.show_value(getattr(gauge, name))
         self._allow_limits(gauge.nominal is not None)
 
-    def _allow_limits(self, allowed: bool) -> None:
+    def _allow_limits(self, has_nominal: bool) -> None:
+        """Without a nominal only where it is known; a field that is not allowed looks like the panel behind it."""
+        allowed = has_nominal or self._ideal is not None
+        tip = "" if has_nominal else NOMINAL_ZERO if allowed else NOMINAL_FIRST
         for name in LIMITS:
-            self.fields[name].setEnabled(allowed)
-            self.fields[name].setToolTip(self.fields[name].spec.help if allowed else NOMINAL_FIRST)
+            field = self.fields[name]
+            field.setEnabled(allowed)
+            field.setToolTip(tip or field.spec.help)
+            field.setPlaceholderText("none" if allowed else "nominal first")
 
     def _make(self, gauge: Gauge) -> None:
         for i in range(self._grid.count() - 1, -1, -1):
@@ -135,7 +146,13 @@ class PartEditor(QWidget):
         self._tell("")
 
     def _set(self, name: str, value: Any, merge: str = "") -> None:
-        self.session.document.set((*self.path, name), value, f"change {name} of a measure", merge)
+        gauge, what = value_at(self.session.project, self.path), f"change {name} of a measure"
+        if name in LIMITS and value is not None and gauge.nominal is None and self._ideal is not None:
+            # one step of undo, and no moment at which the measure is a tolerance of nothing
+            changed = gauge.model_copy(update={"nominal": self._ideal, name: value})
+            self.session.document.set(self.path, changed, what, merge)
+        else:
+            self.session.document.set((*self.path, name), value, what, merge)
 
     def _tell(self, why: str) -> None:
         self.problem.setText(why)

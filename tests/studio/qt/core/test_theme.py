@@ -38,3 +38,11 @@ def test_the_outline_of_what_is_ticked_typed_into_or_pressed_can_be_seen(colours
         assert contrast(drawn, ground) >= OUTLINE
         assert contrast(colours.accent, ground) >= OUTLINE, "of the field that has the focus"
     assert QColor(drawn).lightness() == pytest.approx(QColor(colours.edge).lightness(), abs=6)
+
+
+@BOTH
+def test_a_field_that_takes_nothing_is_told_from_one_that_does(colours: Colours) -> None:
+    made, role, group = theme.outlined(colours), QPalette.ColorRole, QPalette.ColorGroup
+    assert made.color(group.Disabled, role.Base) == QColor(colours.window) != made.color(group.Active, role.Base)
+    drawn = made.color(group.Disabled, role.Window).darker(theme.FUSION_DARKER).name()
+    assert contrast(drawn, colours.window) < OUTLINE / 1.5, "its outline is no longer that of what can be typed into"

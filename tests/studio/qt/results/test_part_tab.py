@@ -144,7 +144,8 @@ def test_a_tolerance_needs_its_nominal(panel: ResultsPanel, qtbot: QtBot) -> Non
     panel.figures.setCurrentIndex(PART)
     panel.part.table.selectRow(0)
     editor = panel.part.editor
-    assert not editor.fields["lower"].isEnabled() and "nominal first" in editor.fields["lower"].toolTip()
+    lower = editor.fields["lower"]
+    assert not lower.isEnabled() and "nominal first" in lower.toolTip() and lower.placeholderText() == "nominal first"
     assert panel.session.project.measures == (gauge,)
     for name, text in (("nominal", "0"), ("lower", "-0.1"), ("nominal", ""), ("name", "ground")):
         field = editor.fields[name]
