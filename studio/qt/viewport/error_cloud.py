@@ -70,13 +70,13 @@ class ErrorCloud(QObject):
         self._data, self._actor = _point_actor(POINT_PX)
         self._marks, self._mark_actor = _point_actor(MARK_PX)
         self._rim = _rim_actor(self._data)
+        self._rim.GetMapper().AddObserver("StartEvent", self._hold_nothing_back)
         self.box: Box | None = None
         """Which is drawn about its points."""
         self._edges = Lines(LINE_PX)
         self._edges.actor.PickableOff()
         view.renderer.AddActor(self._edges.actor)
-        for actor in (self._rim, self._actor, self._mark_actor):
-            view.renderer.AddActor(actor)
+        view.renderer.AddObserver("StartEvent", self._come_last)
         self.bar = ColourBar(view)
         self.bar.scaled.connect(self._rescale)
         self.bar.unit_chosen.connect(self._draw)
@@ -91,6 +91,18 @@ class ErrorCloud(QObject):
         for changed in (session.renders_changed, session.measured):
             changed.connect(self.refresh)
         self.refresh()
+
+    def _come_last(self, *_: object) -> None:
+        """After all that a scene has added since, which would cover the rims, as they hold nothing back."""
+        renderer = self.view.renderer
+        if renderer.GetViewProps().GetLastProp() is not self._mark_actor:
+            for actor in (self._rim, self._actor, self._mark_actor):
+                renderer.RemoveActor(actor)
+                renderer.AddActor(actor)
+
+    def _hold_nothing_back(self, *_: object) -> None:
+        """A rim leaves no depth, so that in a small view those of near points do not cover the points behind them."""
+        self.view.renderer.GetRenderWindow().GetState().vtkglDepthMask(0)
 
     @property
     def visible(self) -> bool:
