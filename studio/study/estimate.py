@@ -36,6 +36,8 @@ class Estimate:
     """Of one processor; None: no cell of some sweep was timed yet."""
     bytes: int
     """Of the whole folder in the end."""
+    steps: int = 1
+    """Of the longest motion of its projects, of which every cell measures the first."""
 
 
 def estimate(
@@ -61,7 +63,8 @@ def estimate(
             taken = math.nan if cost is None else (frames + more) * cost[0] + (len(mine) + more) * cost[1]
             seconds += taken
     size = study_bytes(study, len(rows) + cells + searched)
-    return Estimate(cells, renders, searched, None if math.isnan(seconds) else seconds, size)
+    steps = max(base.scene.frame_count for base in bases.values())
+    return Estimate(cells, renders, searched, None if math.isnan(seconds) else seconds, size, steps)
 
 
 def costs(study: Study, bases: Mapping[str, Project], number: int) -> Costs:

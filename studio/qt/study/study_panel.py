@@ -212,7 +212,6 @@ class StudyPanel(QWidget):
             self.told.setText("" if work.problem else EMPTY if empty else "Working out what it takes…")
         self.told.setObjectName("muted" if empty else "")
         self.told.style().polish(self.told)
-        self.told.setVisible(bool(self.told.text()))
         self.time.setVisible(work.estimate is not None and work.estimate.seconds is None and not work.running)
         self._show_state()
 
@@ -231,6 +230,8 @@ class StudyPanel(QWidget):
         work = self.work
         there = len(work.found.rows) if work.found is not None else 0
         left = work.estimate is None or work.estimate.cells + work.estimate.searched > 0
+        # what was worked out before a run is not what is left of it, which the foot tells
+        self.told.setVisible(bool(self.told.text()) and not work.running)
         self.foot.show_state(work.folder, work.job, begun=there > 0 and left)
         self.foot.run.setEnabled(work.estimate is not None and left)
         self.foot.run.setToolTip(f"{there} cells are there; what is missing is measured" if there else "")
@@ -280,6 +281,8 @@ def estimate_text(told: Estimate, processors: int) -> str:
     if told.cells + told.searched == 0:
         return "Every cell is measured."
     parts = [f"{told.cells} cells of {told.renders} renders"]
+    if told.steps > 1:
+        parts.append(f"step 1 of {told.steps} alone")
     if told.searched:
         parts.append(f"up to {told.searched} more that the search asks for")
     if told.seconds is not None:

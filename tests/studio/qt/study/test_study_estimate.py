@@ -1,0 +1,64 @@
+"""What a study takes is told before it runs, and not beside what is left of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from render.scene.motion import LinearStage
+from studio.project.document import Document
+from studio.project.project import Project
+from studio.project.templates import template_folder
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Session, one_of
+from studio.qt.study.study_panel import StudyPanel
+from studio.qt.study.study_work import StudyWork
+from tests.studio.qt.shell.window_hands import until_cancelled
+
+
+@pytest.fixture
+def panel(qtbot: QtBot, tmp_path: Path) -> Iterator[StudyPanel]:
+    """Of the plane, with three values of one field."""
+    file = tmp_path / "plane.json"
+    Project.load(template_folder("plane")).save(file)
+    session = Session(Document(Project.load(file), file))
+    runner = JobRunner(session)
+    made, work = StudyPanel(session, runner), one_of(StudyWork, session)
+    qtbot.addWidget(made)
+    made.show()
+    qtbot.waitExposed(made)
+    work.change_sweep(vary=[{"field": "sensor.read_noise", "values": [1.0, 2.0, 3.0]}])
+    qtbot.waitUntil(lambda: work.estimate is not None)
+    yield made
+    made.close()
+    runner.close()
+    work.close()
+    live(session).close()
+
+
+def test_of_a_motion_it_says_that_one_step_is_measured(panel: StudyPanel, qtbot: QtBot) -> None:
+    assert panel.told.isVisible() and "step" not in panel.told.text()
+    panel.session.set(("scene", "motion"), LinearStage(steps=20))
+    qtbot.waitUntil(lambda: "step 1 of 20 alone" in panel.told.text())
+
+
+def test_while_it_runs_only_what_is_left_is_told(
+    panel: StudyPanel, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(*_: object, progress: object, cancelled: object, **__: object) -> None:
+        until_cancelled(progress, cancelled)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("studio.qt.study.study_work.run_into", run)
+    work = panel.work
+    (tmp_path / "results").mkdir()
+    work.choose_folder(tmp_path / "results")
+    qtbot.waitUntil(lambda: panel.foot.run.isEnabled())
+    assert panel.told.isVisible() and "cells of" in panel.told.text()
+    work.start()
+    assert work.running and panel.told.isHidden()
+    work.stop()
+    qtbot.waitUntil(lambda: not work.running and panel.told.isVisible())
