@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import MARKS, beside_nominal, counts_text, small_text, value_text
+from analysis.report.gauge_table import DEFINITIONS, MARKS, beside_nominal, counts_text, small_text, value_text
 from analysis.report.units import NONE
 from studio.project.project import ProfileSection
 from studio.qt.core.delete_key import DeleteKey
@@ -249,7 +249,10 @@ class PartTab(QWidget):
         self._tell()
 
     def _show_row(self, row: int, gauge: Gauge, reading: Reading | None) -> None:
-        texts, tip = [gauge.name, NONE, NONE, NONE, NONE], f"<p>{TITLES[gauge.kind]}</p>"
+        texts, tip = (
+            [gauge.name, NONE, NONE, NONE, NONE],
+            f"<p>{TITLES[gauge.kind]}</p>{DEFINITIONS.get(gauge.kind, '')}",
+        )
         if reading is not None:
             verdict = "not measured" if reading.reason else MARKS.get(reading.verdict or "", NONE)
             figures = [small_text(value, gauge.unit) for value in (reading.sigma, reading.error)]
@@ -316,8 +319,11 @@ class PartTab(QWidget):
 
     def _lay_out(self) -> None:
         menu = QMenu(self.add)
+        menu.setToolTipsVisible(True)
         for kind, title in TITLES.items():
-            menu.addAction(title).triggered.connect(partial(self._start_asked, kind))
+            asked = menu.addAction(title)
+            asked.setToolTip(DEFINITIONS.get(kind, ""))
+            asked.triggered.connect(partial(self._start_asked, kind))
         self.add.setMenu(menu)
         self.table.setColumnCount(len(HEADINGS))
         self.table.setHorizontalHeaderLabels(list(HEADINGS))
