@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -99,19 +99,31 @@ class Document:
     def save(self, path: Path | None = None, name: str | None = None) -> None:
         """Write the file, under another name of the project if one is given, whole or not at all.
 
-        InputError: it cannot be written; the document is unharmed.
+        The name is no edit: undo and redo lead to projects that have it. InputError: it cannot be written; the document
+        is unharmed.
         """
         target = path or self.path
         if target is None:
             raise InputError("the project has no file yet", where=self.project.name, cure="use Save as")
         project = self.project if name is None else replaced(self.project, ("name",), name)
         project = project.save(target)
+        if name is not None:
+            old = self.project.name
+            self._undo, self._redo = (_renamed(edits, old, name) for edits in (self._undo, self._redo))
         self.path, self.root, self.project, self._saved = target, target.parent, project, project
         self._tell()
 
     def _tell(self) -> None:
         for listener in list(self.listeners):
             listener()
+
+
+def _renamed(edits: list[Edit], old: str, name: str) -> list[Edit]:
+    """With another name of the projects before that have the old one."""
+    return [
+        replace(edit, before=edit.before.model_copy(update={"name": name})) if edit.before.name == old else edit
+        for edit in edits
+    ]
 
 
 def value_at(project: Project, path: FieldPath) -> Any:

@@ -170,8 +170,9 @@ class FileActions(QObject):
                 self.replace(document)
                 if document.path is None and scale != 1.0:
                     self.session.message.emit("info", _of_the_images(document.project, scale))
-        if is_scan_of(found, session.project):
-            scan_steps(session).show(found, session.project, scale)
+        # recovered work may be of another scene: the figures are those of the project that was scanned
+        if is_scan_of(found, document.project):
+            scan_steps(session).show(found, document.project, scale)
         else:
             scan_steps(session).show(found)
         self.preferences.add_recent(folder)

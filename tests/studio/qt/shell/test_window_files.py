@@ -31,7 +31,7 @@ from tests.studio.qt.shell.window_hands import (
     until_cancelled,
 )
 from tests.studio.qt.small_session import small_render
-from tests.studio.scan_of_steps import small_scan
+from tests.studio.scan_of_steps import SCALE, small_scan
 
 POWER = ("scene", "rig", "lasers", 0, "power")
 
@@ -65,6 +65,21 @@ class TestFiles:
         choose_file(monkeypatch, tmp_path / "third.json")
         assert window.files.save_as()
         assert window.session.project.name == "Bracket 12"
+
+    def test_undo_leaves_a_project_the_name_of_its_file(
+        self, window: MainWindow, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    ) -> None:
+        from studio.qt.shell.file_actions import template
+
+        window.files.replace(template("plane", window.files.autosave))
+        before = window.session.project
+        window.session.set(POWER, 0.004)
+        choose_file(monkeypatch, tmp_path / "part7.json")
+        assert window.files.save_as()
+        window.session.document.undo()
+        assert window.session.project == before.model_copy(update={"name": "part7"})
+        window.session.document.redo()
+        assert window.session.project.name == "part7" and not window.session.document.dirty
 
     def test_a_new_project_does_not_touch_the_one_it_comes_from(self, window: MainWindow) -> None:
         from studio.project.templates import template_folder
@@ -186,6 +201,9 @@ class TestFiles:
         assert window.session.project.scene.lasers[0].power == 0.007
         assert window.session.document.path == file and window.isWindowModified()
         assert not crashed.file.exists()
+        qtbot.waitUntil(lambda: window.session.shown is not None)
+        assert window.session.shown is not None
+        assert window.session.shown.image_scale == SCALE, "its figures are those of the project that was scanned"
 
     def test_work_that_is_not_wanted_leaves_the_project_as_it_was_saved(
         self, window: MainWindow, qtbot: QtBot, small_project: Path
