@@ -40,14 +40,22 @@ def as_kept(session: Session, render: Render, name: str) -> Kept:
     """A render of the session as a column of the table."""
     found = best(render.measurements, session.project) if render.measurements else []
     made = render.made_from.get("measurements") if render.measurements else None
-    project = render.project if made is None else made[1].project
+    project = (render.project if made is None else made[1].project).read_as(session.project)
+    scene = project.scene
+    # of now's measures those of lasers and steps that the render has: its file would be refused with others
+    own = tuple(
+        gauge
+        for gauge in project.measures
+        if gauge.laser < len(scene.lasers) and (gauge.step is None or gauge.step < scene.frame_count)
+    )
+    project = project.model_copy(update={"measures": own})
     return Kept(
         name,
         render.created,
-        project.read_as(session.project),
+        project,
         render.scanner_scale,
         figures_of(found),
-        readings=readings(render.project.read_as(session.project), render.frame, found),
+        readings=readings(render.project.read_as(project), render.frame, found),
         laser_power=() if made is None else made[1].laser_power,
         stopped=not render.final and not render.refining,
     )

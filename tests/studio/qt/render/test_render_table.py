@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
+from analysis.gauges.gauge import Gauge
 from render.base.errors import InputError
 from studio.project.document import Document
 from studio.qt.core.session import Render, Session
@@ -76,6 +77,23 @@ def test_figures_stand_beside_the_settings_that_they_were_measured_with(qtbot: Q
     opened = open_render(session, again)
     other = develop_again(opened.frame, development(opened.project, longer))
     assert np.array_equal(other[0].pixels, images[0].pixels) and opened.final
+
+
+def test_a_render_is_kept_without_measures_of_a_laser_that_it_does_not_have(qtbot: QtBot, tmp_path: Path) -> None:
+    file = tmp_path / "project.json"
+    project = small_project().save(file)
+    session = Session(Document(project, file))
+    world, frame = small_render()
+    render = Render(1, project, world, frame)
+    session.add_render(render)
+    lasers = session.project.scene.lasers
+    session.set(("scene", "rig", "lasers"), (*lasers, lasers[0].model_copy(update={"name": "second"})))
+    regions = ((-0.02, 0.0), (0.0, 0.02))
+    both = tuple(Gauge(name=f"step {k}", kind="step", laser=k, regions=regions) for k in (0, 1))
+    assert session.set(("measures",), both)
+    keep_render(session, render, "one laser")
+    (kept,), wrong = kept_renders(tmp_path)
+    assert not wrong and kept.project.measures == both[:1]
 
 
 def test_a_render_that_was_stopped_is_opened_as_stopped(qtbot: QtBot, tmp_path: Path) -> None:
