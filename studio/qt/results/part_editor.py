@@ -8,7 +8,7 @@ from typing import Any
 
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 
-from analysis.gauges.gauge import Gauge
+from analysis.gauges.gauge import NEVER_NEGATIVE, Gauge
 from render.base.errors import InputError
 from studio.editing.forms import describe_item
 from studio.editing.units import Unit
@@ -24,6 +24,7 @@ NOMINAL_FIRST = "Give the nominal first: what is allowed is a deviation from it"
 IDEALLY_ZERO = ("flatness", "straightness", "flush")
 """Kinds of which every drawing means 0, and gives the tolerance alone."""
 NOMINAL_ZERO = "The nominal becomes 0, as drawings mean it where they give a tolerance alone"
+BOTH_SIDES = f"{NOMINAL_ZERO}, and the tolerance is one to both sides"
 
 
 class PartEditor(QWidget):
@@ -48,6 +49,7 @@ class PartEditor(QWidget):
         self._made_for: tuple[FieldPath, str] = (), ""
         self._ideal: float | None = None
         """The nominal of a measure that has none, once a tolerance is given; None: a person has to say it."""
+        self._tip_of_ideal = NOMINAL_ZERO
         self._dragged = False
         self._given_up = ""
         """Why what was typed was dropped, as its field is about to be left."""
@@ -62,6 +64,7 @@ class PartEditor(QWidget):
             self._made_for = self.path, gauge.unit
             self._make(gauge)
         self._ideal = 0.0 if gauge.kind in IDEALLY_ZERO else None
+        self._tip_of_ideal = NOMINAL_ZERO if gauge.kind in NEVER_NEGATIVE else BOTH_SIDES
         for name, field in self.fields.items():
             field.show_value(getattr(gauge, name))
         self._allow_limits(gauge.nominal is not None)
@@ -69,7 +72,7 @@ class PartEditor(QWidget):
     def _allow_limits(self, has_nominal: bool) -> None:
         """Without a nominal only where it is known; a field that is not allowed looks like the panel behind it."""
         allowed = has_nominal or self._ideal is not None
-        tip = "" if has_nominal else NOMINAL_ZERO if allowed else NOMINAL_FIRST
+        tip = "" if has_nominal else self._tip_of_ideal if allowed else NOMINAL_FIRST
         for name in LIMITS:
             field = self.fields[name]
             field.setEnabled(allowed)
@@ -149,7 +152,8 @@ class PartEditor(QWidget):
         gauge, what = value_at(self.session.project, self.path), f"change {name} of a measure"
         if name in LIMITS and value is not None and gauge.nominal is None and self._ideal is not None:
             # one step of undo, and no moment at which the measure is a tolerance of nothing
-            changed = gauge.model_copy(update={"nominal": self._ideal, name: value})
+            limits = {name: value} if gauge.kind in NEVER_NEGATIVE else {"lower": -abs(value), "upper": abs(value)}
+            changed = gauge.model_copy(update={"nominal": self._ideal, **limits})
             self.session.document.set(self.path, changed, what, merge)
         else:
             self.session.document.set((*self.path, name), value, what, merge)
