@@ -38,6 +38,7 @@ from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job
 from studio.scan.deviation import Compared, Question, compare_cloud, map_of, write_deviation
 from studio.scan.first_range import deviation_limit
+from studio.scan.logo import gone
 
 LANE = "deviation"
 ALIGNMENTS: dict[Alignment, str] = {
@@ -50,7 +51,7 @@ ALL = "All objects"
 CHANGED = "Changed since: Compare again. The figures are still of what they name."
 ANOTHER = "Other points are shown since: Compare again."
 MARGIN = 8
-FIRST_UM, MOST_UM = 100.0, 100_000.0
+FIRST_UM, MOST_UM = 100.0, 1_000_000.0
 SPOTS_HINT = "x,y,z of six places on the nominal, mm, world: three, two, one; between them semicolons"
 
 
@@ -143,6 +144,8 @@ class DeviationTab(QWidget):
         if told.surface_of != self._given_part:
             self._given_part = told.surface_of
             self.part.setCurrentIndex(max(0, self.part.findText(told.surface_of or ALL)))
+            if missing := gone(self.session.project):
+                self.session.message.emit("warning", missing)
         limits = told.lower, told.upper
         if limits != self._given_limits:
             self._given_limits = limits
@@ -334,7 +337,7 @@ class DeviationTab(QWidget):
 
 def _limit(value: float) -> UnitBox:
     """um; its least value means that there is none."""
-    box = UnitBox(ShownUnit.named("µm"), -MOST_UM, MOST_UM, 1)
+    box = UnitBox(ShownUnit.named("µm"), -MOST_UM, MOST_UM, 3)
     box.setSpecialValueText("none")
     box.setAccessibleName("Tolerance")
     box.setValue(value)

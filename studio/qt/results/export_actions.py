@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from studio.project.project import Project
     from studio.scan.export import Exported, Writer
 
+KEEP_ALL = "The export of the Height map tab (Alt+Z) keeps them by All heights."
 KINDS = {
     "export_html": ("Report (*.html)", ".html", "report"),
     "export_pdf": ("Report (*.pdf)", ".pdf", "report"),
@@ -143,8 +144,8 @@ class ExportActions(QObject):
             if kind == "height map":  # nobody was asked about the file beside the picture
                 check_replaceable([path.with_suffix(".json")])
             written = export.export_unless(cancelled, writer, path, what)
-            if kind == "height map":
-                left_out.extend(filter(None, [left_out_of(written[1])]))
+            if kind == "height map" and (beyond := left_out_of(written[1])):
+                left_out.append(f"{beyond} {KEEP_ALL}")
             return written
 
         notes = scale_notes(render.scanner_scale)
