@@ -29,6 +29,7 @@ DRAWN_SIGMAS = 3.0
 DRAWN, DRAWN_SEED = 50, 11
 """Curves that are drawn by chance then: with a third of the points false, 15 of them have no false one in three."""
 DRAWN_STEPS = 2
+"""Of Gauss and Newton through as many points as parameters: lines are there after the first, circles begin there."""
 ALONE = 3.0
 """Times the steps on either side, of a step that stands alone."""
 GRAZING = 1e-3
@@ -193,7 +194,7 @@ def _of_most_points(
     Stat. Assoc. 79, 1984): no far points draw it to them, as long as they are fewer than half.
     """
     random, curve, used = np.random.default_rng(DRAWN_SEED), curve_of(here), np.flatnonzero(here)
-    best, least = start(local), math.inf
+    nearest, least = start(local), math.inf
     with np.errstate(all="ignore"):  # points that are no curve's
         for _ in range(DRAWN):
             some = np.sort(random.choice(len(local), parameters, replace=False))
@@ -204,11 +205,10 @@ def _of_most_points(
             # to first order: which curve is nearest is not a matter of where the feet of its points are
             middle = float(np.median(np.abs(value / _along(by_point, direction))))
             if middle < least:
-                best, least = theta, middle
-        best = _misses(curve, local, direction, best)[0]
-    least = float(np.median(np.abs(best)))
-    usual = max(1.0, MAD_TO_SIGMA * least)
-    return _off_at_a_leap(best, OUTLIER_SIGMAS * usual), usual
+                nearest, least = theta, middle
+        e = _misses(curve, local, direction, nearest)[0]
+    usual = max(1.0, MAD_TO_SIGMA * float(np.median(np.abs(e))))
+    return _off_at_a_leap(e, OUTLIER_SIGMAS * usual), usual
 
 
 def _through(curve: Curve, points: Float, theta: Float) -> Float:
