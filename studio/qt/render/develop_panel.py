@@ -328,6 +328,8 @@ class DevelopPanel(QWidget):
         world = render.world
 
         known = render.measurements if images is self._measured else {}
+        if tuple(known) == methods and render.has("measurements", how):
+            return  # the scene changed, and nothing that was measured
 
         def work(progress: Progress, cancelled: Cancel) -> tuple[dict[str, list[Measurement]], list[str]]:
             missing = tuple(method for method in methods if method not in known)
