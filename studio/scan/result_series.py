@@ -157,7 +157,7 @@ def _covered(found: Measurement, view: ErrorView) -> float:
     if view.kind == "position" or points.calibration is None:
         return measures(errors, view.kind).coverage
     noise = points.sigma_depth if view.kind == "depth" else errors.sigma_off_surface
-    common = points.sigma_depth_systematic if view.kind == "depth" else points.sigma_systematic
+    common = points.sigma_depth_systematic if view.kind == "depth" else errors.systematic_off_surface
     error, sigma = error_values(errors, view) / view.scale, np.hypot(noise, common)
     known = np.isfinite(error) & np.isfinite(sigma)
     return float(np.mean(np.abs(error[known]) <= 2.0 * sigma[known])) if known.any() else math.nan
