@@ -138,9 +138,15 @@ def value_at(project: Project, path: FieldPath) -> Any:
 
 
 def replaced(project: Project, path: FieldPath, value: Any) -> Project:
-    """The project with one value changed, validated as a whole. InputError names the field and what is allowed."""
+    """The project with one value changed, validated as a whole. InputError names the field and what is allowed.
+
+    The report goes on judging an object that gets another name.
+    """
     try:
         result = _replaced(project, path, value)
+        renamed = path[:2] == ("scene", "objects") and path[3:] == ("name",)
+        if renamed and value_at(project, path) == project.delivery.surface_of:
+            result = _replaced(result, ("delivery", "surface_of"), value)
     except ValidationError as error:
         raise input_error(error, Project, {}, "") from None
     assert isinstance(result, Project)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from analysis.report.units import percent
 from studio.qt.core.jobs import RENDER, JobRunner
 from studio.qt.core.session import Session
 from studio.qt.shell.panels import Panels
@@ -32,6 +33,7 @@ def what_goes(session: Session, runner: JobRunner, panels: Panels) -> Going:
     """A scan or study under way is not told of: what is measured stays in its folder, and the next run goes on."""
     job = runner.job(RENDER)
     asked = job is not None and job.name == "render" and panels["render"].asked and not job.cancel_asked  # type: ignore[attr-defined]
-    told = f"A render is under way, {job.done:.0%} of it done, and is lost." if asked and job is not None else ""
+    done = percent(job.done, 0) if asked and job is not None else ""
+    told = f"A render is under way, {done} of it done, and is lost." if done else ""
     made = [one for one in session.renders if one.asked and not (one.kept or one.scan or one.cell or one.refining)]
     return Going(told, len(made))

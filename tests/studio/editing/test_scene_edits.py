@@ -166,6 +166,13 @@ class TestLists:
             scene_edits.rename(project, (*OBJECTS, 1), "  ")
         assert scene_edits.rename(project, (), "Another").name == "Another"
 
+    def test_the_report_goes_on_judging_an_object_that_is_renamed(self, project: Project) -> None:
+        second = project.scene.objects[1].name
+        judged = replaced(project, ("delivery", "surface_of"), second)
+        assert scene_edits.rename(judged, (*OBJECTS, 1), "part").delivery.surface_of == "part"
+        assert scene_edits.rename(judged, (*OBJECTS, 0), "part").delivery.surface_of == second
+        assert scene_edits.rename(project, (*OBJECTS, 1), "part").delivery.surface_of == ""
+
     def test_hidden_objects_are_hidden(self, project: Project) -> None:
         made = scene_edits.set_visible(project, (*OBJECTS, 0), False)
         assert [item.name for item in made.scene.visible_objects] == [project.scene.objects[1].name]
