@@ -123,11 +123,15 @@ class Frame:
         return next((one for one in self.quality if (one.group, one.laser) == (group, laser)), None)
 
     @property
+    def awaits_ambient(self) -> bool:
+        """Ambient light is to come; without it the line has too little noise, and no texture beside it."""
+        ambient = self.plan.step("ambient", "ambient")
+        return ambient is not None and bool(ambient.computed) and self.quality_of("ambient") is None
+
+    @property
     def unfinished(self) -> bool:
         """Some light group of the plan has reached neither its target error nor the most work that it may take."""
-        ambient = self.plan.step("ambient", "ambient")
-        begun = {one.group for one in self.quality}
-        if ambient is not None and ambient.computed and "ambient" not in begun:
+        if self.awaits_ambient:
             return True
         reflected = [one for one in self.quality if one.group == "indirect"]
         if len(reflected) < len(self.laser_indirect):

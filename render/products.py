@@ -27,7 +27,7 @@ QUICK = DirectLight(quick=True)
 """A first look at the lines."""
 AIMED = DirectLight(aimed=True)
 """Direct light again, where the goal asks for more than the image does."""
-PRODUCTS: tuple[LightGroup[Any], ...] = (DirectLight(), IndirectLight(), PixelTruth(), AmbientLight())
+PRODUCTS: tuple[LightGroup[Any], ...] = (DirectLight(), PixelTruth(), AmbientLight(), IndirectLight())
 """To add a light group is to add it here, once there is a field of `Frame` for it."""
 
 LOOK_SIDE = 256

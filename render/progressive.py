@@ -39,7 +39,7 @@ LOOK_SECONDS = 0.02
 AIM = "where errors matter"
 """Stage in which the goal is asked."""
 AIMING = ("direct", "indirect")
-"""Light groups that decide where errors of the later ones matter."""
+"""Light groups that decide where errors matter."""
 BUILD_WORK = 10.0
 """Rays that take as long as the acceleration structure of one triangle."""
 
@@ -123,11 +123,14 @@ def frames(
                 shown = frame = replace(frame, seconds=clock.so_far(), counts=counts)
                 with clock.shown():
                     yield frame
-        if goal is not None and product.group in AIMING and aimed_later(waiting[i + 1 :], product):
+        told = product.group == "indirect" and not follows  # what is told of a frame is of all its light
+        if goal is not None and product.group in AIMING and (told or aimed_later(waiting[i + 1 :], product)):
             with clock.stage(AIM, 0):
                 if not follows:
-                    look = ambient_look(placed, settings, run) if look is None else look
-                    frame = replace(frame, importance=goal(replace(frame, ambient=look)))
+                    if look is None and frame.ambient is None:
+                        look = ambient_look(placed, settings, run)
+                    seen = frame if frame.ambient is not None else replace(frame, ambient=look)
+                    frame = replace(frame, importance=goal(seen))
                 elif frame.importance is None:
                     # by the light of the block's first frame; of light much like it asking again tells nothing more
                     look, reflected = run.taught("ambient"), run.taught("laser_indirect") or ()

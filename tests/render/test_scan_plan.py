@@ -52,7 +52,7 @@ def test_the_plan_is_the_same_on_any_number_of_threads_and_says_what_it_is(groov
     assert one == two and set(asked) == set(pilot_steps(12))
     assert one.plans["indirect"].kinds == INTERREFLECTION
     assert one.pilot_steps == (0, 2, 5, 8, 11) and one.frame_count == 12
-    assert one.mark == f"laser light {INTERREFLECTION}, ambient light 1"
+    assert one.mark == f"ambient light 1, laser light {INTERREFLECTION}"
 
 
 @pytest.mark.parametrize(("share", "computed"), [(0.03, True), (0.015, False), (math.inf, True)])
