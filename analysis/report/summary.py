@@ -48,7 +48,7 @@ def headline(report: ReportInput) -> str:
         f"{micrometres(abs(depth.bias), 2)} {side} the camera (bias) and scatters about that by "
         f"{micrometres(depth.sigma)} (standard deviation), {micrometres(depth.rmse)} in all (RMSE). "
         f"95 % of the points{' in a sample' if found.sampled else ''} lie within {micrometres(found.surface.p95)} of "
-        "the true surface."
+        "the true surface, as distances from it and not depths."
     )
 
 

@@ -179,10 +179,11 @@ def _focus(r: Readouts) -> Row:
     help = (
         f"Diameter of the blur disc along the line. At most {SHARP_PX:g} px, which counts as sharp, on the axis from "
         f"{_lengths(r.sharp_nearest, r.sharp_farthest)}. Set the focus distance to that of the line, or close the "
-        "aperture; a tilted sensor (tauX, tauY of the distortion) tilts the plane in focus. Images show it where the "
-        "camera's lens is rendered as a thin lens, or the sensor's defocus is switched on."
+        "aperture; a tilted sensor (tauX, tauY of the distortion) tilts the plane in focus. Images have it where the "
+        "camera's lens is rendered as a thin lens, or the sensor's defocus is switched on; else they are sharp at any "
+        "depth, as a real scanner's are not."
     )
-    note = f"sharp {_length(r.sharp_nearest)} to {_length(r.sharp_farthest)}"
+    note = f"sharp {_length(r.sharp_nearest)} to {_length(r.sharp_farthest)}" if r.blurs_images else "off in images"
     if r.blur_px is None:
         return Row("blur", "Defocus blur", NOTHING, note, "", help)
     worst = r.blur_px.high

@@ -73,6 +73,8 @@ class Readouts:
     """Background of ambient light and dark current, unshadowed, median."""
     blur_px: Range | None = None
     """Diameter of the blur disc along the lit line."""
+    blurs_images: bool = True
+    """Images have that blur: their lens is rendered, or the sensor's defocus is switched on."""
     photon_sigma: float | None = None
     """Expected standard deviation of depth_z from photon and read noise (Cramer-Rao bound), median."""
     speckle_sigma: float | None = None
@@ -113,6 +115,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         working_depth_per_px=_working_resolution(camera, T_camera_laser, plane, across, nearest, farthest),
         sharp_nearest=sharp[0],
         sharp_farthest=sharp[1],
+        blurs_images=sensor.defocus_by(camera.lens.model) != "nothing",
         full_well=sensor.full_well,
         occluded=look.fan(laser).occluded,
         scan_lines=camera.height if rows else camera.width,

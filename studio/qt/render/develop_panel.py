@@ -301,6 +301,8 @@ class DevelopPanel(QWidget):
             return images
 
         def then(images: list[Image]) -> None:
+            if render.refining and frame.awaits_ambient:
+                return  # figures without its noise would be too good, and take time from it
             self._to_measure = (render, frame, how, images, methods)
             self._rest.start()
 

@@ -9,6 +9,8 @@ from studio.scan.redevelop import is_developed_otherwise
 from studio.scan.remarks import scale_head
 
 STOPPED = "This render was stopped early: light is missing, and the figures are of what there is."
+AWAITED = "The render goes on: figures come with ambient light, without whose noise they would be too good."
+REFINING = "The render goes on: light is still to come, and these are the figures so far."
 MEASURING = "Measuring… until then these are the figures of the settings before."
 CHANGED = "The scene has changed since: these are the figures of the render as it was."
 MEASURED_OTHERWISE = (
@@ -32,8 +34,9 @@ def heads(session: Session, step_problem: str) -> list[str]:
         told.append(CHANGED)
     if measured_otherwise(session, render):
         told.append(MEASURED_OTHERWISE)
-    if not render.final and not render.refining:
-        told.append(STOPPED)
+    if not render.final:
+        so_far = REFINING if render.measurements else AWAITED
+        told.append(so_far if render.refining else STOPPED)
     return [*told, *filter(None, [scale_head(render.scanner_scale)])]
 
 

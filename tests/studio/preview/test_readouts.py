@@ -125,6 +125,13 @@ def test_blur_is_nought_in_focus_and_the_limits_of_sharpness_have_one_pixel() ->
     assert math.isinf(depth_of_field(beyond)[1]) and math.isfinite(depth_of_field(before)[1])
 
 
+def test_a_blur_that_images_have_not_is_told_to_be_off_in_them() -> None:
+    for defocus in (False, True):
+        project = replaced(sample("plane"), ("sensor", "defocus"), defocus)
+        found = next(row for row in rows(read(project, "plane")) if row.key == "blur")
+        assert (found.note == "off in images") != defocus
+
+
 def test_four_times_the_exposure_halves_the_photon_noise_and_saturates() -> None:
     project = sample("plane")
     time = project.sensor.exposure_time

@@ -15,7 +15,7 @@ from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import one_of
 from studio.qt.render.develop_panel import DevelopPanel
-from studio.qt.results.heads import MEASURING, heads
+from studio.qt.results.heads import AWAITED, MEASURING, REFINING, heads
 from studio.scan.redevelop import development
 from tests.studio.qt.small_session import small_session
 
@@ -264,6 +264,39 @@ def test_while_light_is_to_come_one_method_measures_and_the_last_frame_is_develo
     assert set(render.measurements) == {"likelihood", "gaussian", "centre_of_mass"}
     assert len(developed) == 2 and render.measurements["likelihood"] is second
     made.close()
+
+
+def test_no_figure_is_shown_while_the_noise_of_ambient_light_is_to_come(qtbot):
+    """The first figures were of laser light alone, a sixth too good."""
+    session = small_session(rendered=True)
+    render = session.shown
+    whole, render.final = render.frame, False
+    assert not whole.awaits_ambient
+    laser = tuple(one for one in whole.quality if one.group != "ambient")
+    render.frame = replace(whole, ambient=None, quality=laser)
+    made = DevelopPanel(session)
+    qtbot.addWidget(made)
+    made.refresh()
+    qtbot.waitUntil(lambda: bool(render.images) and not made.busy)
+    assert render.frame.awaits_ambient and not render.measurements and AWAITED in heads(session, "")
+    render.frame = whole
+    session.renders_changed.emit()
+    qtbot.waitUntil(lambda: bool(render.measurements) and not made.busy)
+    assert REFINING in heads(session, "")
+    render.final = True
+    assert not {REFINING, AWAITED} & set(heads(session, ""))
+    made.close()
+
+
+def test_a_change_of_the_scene_alone_measures_nothing_again(qtbot, panel, monkeypatch):
+    from studio.qt.render import develop_panel
+
+    session = panel.session
+    monkeypatch.setattr(develop_panel, "measure_again", lambda *_, **__: pytest.fail("nothing changed"))
+    session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.5)
+    qtbot.waitUntil(lambda: not panel.busy)
+    session.document.undo()
+    qtbot.waitUntil(lambda: not panel.busy)
 
 
 def test_figures_of_the_settings_before_are_told_until_they_are_measured_again(qtbot, panel, monkeypatch):
