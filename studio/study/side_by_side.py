@@ -7,16 +7,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from analysis.report.colour import method_name
 from analysis.report.gauge_table import scale_and_unit, small_text, value_text
 from analysis.report.units import digits
 from render.base.csv_file import write_csv
+from studio.editing.units import Unit
 from studio.project.project import Project
 from studio.scan.kept_renders import FIGURES, Kept
 from studio.scan.redevelop import Development
+from studio.scan.remarks import scale_head
 from studio.scan.stages import scaled_sensor
-from studio.study.changes import changes
+from studio.study.changes import Change, changes
 
 NONE = "-"
+PIXELS = "px"
+DEVELOPING = ("sensor", "extraction", "scene.rig.camera.lens")
+"""Fields that decide figures of the same light, beside the lasers' powers."""
+KEPT_AS_READ = "Keep with the project keeps a render as it is read now."
 
 
 @dataclass(frozen=True)
@@ -31,11 +38,15 @@ class Row:
     """Of a figure, all its digits, in the unit of the label."""
 
 
-def side_by_side(renders: Sequence[Kept]) -> list[Row]:
-    """Figures first: "12.3 (-4.5)" is 4.5 less than the first render's; then every setting that is not the same."""
+def side_by_side(renders: Sequence[Kept], now: Project | None = None) -> list[Row]:
+    """Figures first: "12.3 (-4.5)" is 4.5 less than the first render's; then every setting that is not the same.
+
+    now: the open project; where a render was developed otherwise, or is kept, a row each tells by what.
+    """
     if not renders:
         return []
     first = renders[0]
+    one_scale = all(one.image_scale == first.image_scale for one in renders)
     scales = tuple(f"{one.image_scale:.3g}" for one in renders)
     rows = [Row("Image scale", scales, False)] if set(scales) != {"1"} else []
     if any(one.stopped for one in renders):
@@ -44,9 +55,14 @@ def side_by_side(renders: Sequence[Kept]) -> list[Row]:
         values = [one.figures.get(name, math.nan) for one in renders]
         if not any(map(math.isfinite, values)):
             continue
-        cells = [_cell(value, values[0] if k else math.nan) for k, value in enumerate(values)]
-        rows.append(Row(f"{name} / {unit}", tuple(cells), True, tuple(values)))
+        own = unit == PIXELS and not one_scale  # pixels of another size have no difference
+        alike = [one.image_scale == first.image_scale or not own for one in renders]
+        cells = [_cell(value, values[0] if k and alike[k] else math.nan) for k, value in enumerate(values)]
+        label = f"{name} / {unit}" + (" of its own image" if own else "")
+        rows.append(Row(label, tuple(cells), True, tuple(values)))
     rows += _measures(renders)
+    developed = _developed_rows(renders, now)
+    rows += developed.values()
     labels: dict[str, str] = {}
     found: list[dict[str, tuple[str, str]]] = []
     for one in renders:
@@ -59,11 +75,71 @@ def side_by_side(renders: Sequence[Kept]) -> list[Row]:
         labels |= {field: change.label for field, change in differing.items()}
         found.append({field: (change.a, change.b) for field, change in differing.items()})
     for field, label in labels.items():
-        if field == "name" or field.startswith(("measures", "delivery")):  # all are read by those of now
-            continue
+        if field in developed or field == "name" or field.startswith(("measures", "delivery")):
+            continue  # it has its row, or all are read by those of now
         own = next(each[field][0] for each in found if field in each)
         rows.append(Row(label, tuple(each[field][1] if field in each else own for each in found), False))
     return rows
+
+
+def developed_as(renders: Sequence[Kept], now: Project) -> str:
+    """The line above the table: by which settings its figures are."""
+    other = [one.name for one in renders if _developed_otherwise(_as_measured(one), now)]
+    settings = ", ".join(text for _, text in _settings(now).values())
+    if not other:
+        return f"All developed as the project is now: {settings}. {KEPT_AS_READ}"
+    who = "All" if len(other) == len(renders) else ", ".join(other)
+    told = f"The project is now at {settings}. {who}: developed by other settings, which stand in the rows below."
+    return f"{told} A render of this session is developed as the project is then whenever it is shown; {_lower()}"
+
+
+def scale_warnings(renders: Sequence[Kept]) -> list[str]:
+    """Which columns are not the scanner's figures."""
+    scales = dict.fromkeys(one.image_scale for one in renders if one.image_scale != 1.0)
+    return [
+        f"{', '.join(one.name for one in renders if one.image_scale == scale)}: {scale_head(scale)}" for scale in scales
+    ]
+
+
+def _lower() -> str:
+    return KEPT_AS_READ[:1].lower() + KEPT_AS_READ[1:]
+
+
+def _settings(project: Project) -> dict[str, tuple[str, str]]:
+    """By its field: what the row of a setting is called, and its value; those by which renders are developed most."""
+    sensor, ms, watts = project.sensor, Unit.of("s"), Unit.of("W")
+    gain = "gain by full well" if sensor.gain is None else f"gain {sensor.gain:g} DN/e-"
+    powers = {
+        f"scene.rig.lasers[{laser.name}].power": (f"{laser.name}: Power", watts.with_unit(laser.power))
+        for laser in project.scene.lasers
+    }
+    return {
+        "sensor.exposure_time": ("Sensor: Exposure time", ms.with_unit(float(f"{sensor.exposure_time:.9g}"))),
+        "sensor.gain": ("Sensor: Gain", gain),
+        "sensor.bits": ("Sensor: Bit depth", f"{sensor.bits} bit"),
+        **powers,
+        "extraction.method": ("Extraction: Method", method_name(project.extraction.method)),
+    }
+
+
+def _developed_rows(renders: Sequence[Kept], now: Project | None) -> dict[str, Row]:
+    """By field; none where the line above the table tells them of all."""
+    if now is None or not any(one.folder or _developed_otherwise(_as_measured(one), now) for one in renders):
+        return {}
+    found = [_settings(_as_measured(one)) for one in renders]
+    labels = {field: label for each in found for field, (label, _) in each.items()}
+    return {
+        field: Row(label, tuple(each[field][1] if field in each else NONE for each in found), False)
+        for field, label in labels.items()
+    }
+
+
+def _developed_otherwise(render: Project, now: Project) -> bool:
+    return any(_is_developing(change) and change.a != change.b for change in changes(render, now))
+
+
+def _is_developing(change: Change) -> bool:
+    return change.field.startswith(DEVELOPING) or change.field.endswith("].power")
 
 
 def _as_measured(render: Kept) -> Project:

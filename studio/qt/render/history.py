@@ -33,6 +33,8 @@ from studio.scan.remarks import scale_name, scale_notes
 THUMBNAIL = QSize(64, 54)
 NEW_LINE = "\u2028"
 """Qt breaks an item's text only here."""
+NAMING = "A name keeps no settings: a render is developed as the project is then whenever it is shown."
+KEEPING = "Its light, its settings and its figures as they are read now are kept, whatever the project becomes."
 SAMPLED = 512
 """Pixels a side that a thumbnail looks at."""
 
@@ -110,7 +112,10 @@ class History(QWidget):
         self.list.setEditTriggers(QAbstractItemView.EditTrigger.EditKeyPressed)
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.list.setUniformItemSizes(True)
-        self.list.setToolTip("Click shows a render, F2 names it, Delete removes it; select two to compare them.")
+        self.list.setToolTip(
+            f"Click shows a render, F2 names it, Delete removes it; select two to compare them.\n{NAMING}\n"
+            f"Keep with the project, in the menu: {KEEPING[:1].lower()}{KEEPING[1:]}"
+        )
         DeleteKey(self.list, self.delete)
         heading = QLabel("Renders")
         heading.setStyleSheet("font-weight: 600")
@@ -247,14 +252,21 @@ class History(QWidget):
         item = self.list.itemAt(where)
         if item is None:
             return
+        menu = self.menu_of(item)
+        menu.exec(self.list.mapToGlobal(where))
+        menu.deleteLater()
+
+    def menu_of(self, item: QListWidgetItem) -> QMenu:
+        """What can be done with a render."""
         menu = QMenu(self)
+        menu.setToolTipsVisible(True)
         menu.addAction("Show", lambda: self.session.show(item.data(Qt.ItemDataRole.UserRole)))
-        menu.addAction("Rename", lambda: self.list.editItem(item))
-        menu.addAction("Keep with the project", lambda: self.keep(item.data(Qt.ItemDataRole.UserRole)))
+        menu.addAction("Rename", lambda: self.list.editItem(item)).setToolTip(NAMING)
+        keep = menu.addAction("Keep with the project", lambda: self.keep(item.data(Qt.ItemDataRole.UserRole)))
+        keep.setToolTip(KEEPING)
         compare = menu.addAction("Compare", self.compare)
         compare.setEnabled(len(self.list.selectedItems()) == 2)
         render = item.data(Qt.ItemDataRole.UserRole)
         menu.addAction("Copy as Python", lambda: copy_as_python(self.session, render))
         menu.addAction("Delete", self.delete)
-        menu.exec(self.list.mapToGlobal(where))
-        menu.deleteLater()
+        return menu

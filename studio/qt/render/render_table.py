@@ -28,17 +28,19 @@ from studio.qt.core.widgets import room_for_a_window, text_button
 from studio.runtime.error_messages import trouble
 from studio.scan.gauging import readings
 from studio.scan.kept_renders import Kept, as_read_now, figures_of, keep, kept_renders, open_kept
-from studio.scan.remarks import best
-from studio.study.side_by_side import Row, side_by_side, write_table
+from studio.scan.remarks import best, scale_name, scale_notes
+from studio.study.side_by_side import Row, developed_as, scale_warnings, side_by_side, write_table
 
 MEASURING = "The shown render is being measured with the settings of now; its figures are still those of before."
-HINT = "Figures are followed by their difference from the first column's. Settings that all have alike are left out."
+HINT = (
+    "Figures are followed by their difference from the first column's. Other settings that all have alike are left out."
+)
 FEWEST_PX, WIDEST_PX = 230, 1280
 
 
 def as_kept(session: Session, render: Render, name: str) -> Kept:
     """A render of the session as a column of the table."""
-    found = best(render.measurements, session.project) if render.measurements else []
+    found = best(render.measurements, render.measured_as) if render.measurements else []
     made = render.made_from.get("measurements") if render.measurements else None
     project = (render.project if made is None else made[1].project).read_as(session.project)
     scene = project.scene
@@ -102,7 +104,10 @@ class RenderTable(QDialog):
         self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.table.setAlternatingRowColors(True)
         self.table.setShowGrid(False)
-        self.open_button = text_button("Open", "The kept render of the chosen column, in the history")
+        self.developed = QLabel(wordWrap=True)
+        self.open_button = text_button(
+            "Open", "The light of the kept render of the chosen column, in the history, developed as the project is now"
+        )
         self.export = text_button("Export as CSV…")
         self.told = QLabel(wordWrap=True)
         self.told.setObjectName("muted")
@@ -111,13 +116,15 @@ class RenderTable(QDialog):
         buttons.addWidget(self.export)
         buttons.addStretch(1)
         column = QVBoxLayout(self)
+        column.addWidget(self.developed)
         column.addWidget(self.table, 1)
         column.addWidget(self.told)
         column.addLayout(buttons)
         self.open_button.clicked.connect(self.open_chosen)
         self.export.clicked.connect(self._ask)
         self.table.itemSelectionChanged.connect(self._show_buttons)
-        session.measured.connect(self._refresh)
+        for changed in (session.measured, session.project_changed):
+            changed.connect(self._refresh)
         self.age = one_of(FiguresAge, session)
         self.age.changed.connect(self._tell)
         self._fill()
@@ -138,7 +145,7 @@ class RenderTable(QDialog):
         session = self.session
         kept = (as_read_now(one, session.project) for one in self._kept)
         renders = [*(as_kept(session, render, name) for render, name in self._shown), *kept]
-        return renders, side_by_side(renders)
+        return renders, side_by_side(renders, session.project)
 
     def _refresh(self) -> None:
         self.renders, self.rows = self._read()
@@ -147,7 +154,8 @@ class RenderTable(QDialog):
 
     def _tell(self) -> None:
         measuring = [MEASURING] if self.age.old else []
-        self.told.setText("\n".join([*measuring, HINT, *self.wrong]))
+        self.developed.setText(developed_as(self.renders, self.session.project) if self.renders else "")
+        self.told.setText("\n".join([*scale_warnings(self.renders), *measuring, HINT, *self.wrong]))
 
     def chosen(self) -> Kept | None:
         """The kept render of the column that is chosen."""
@@ -176,7 +184,10 @@ class RenderTable(QDialog):
         table.setRowCount(len(self.rows))
         for k, render in enumerate(self.renders):
             when = f"\n{read_out(render.created)}" if render.folder is not None else "\nthis session"
-            table.setHorizontalHeaderItem(k, QTableWidgetItem(render.name + when))
+            small = scale_name(render.image_scale)
+            head = QTableWidgetItem(render.name + when + (f"\n{small}" if small else ""))
+            head.setToolTip("\n".join(scale_notes(render.image_scale)))
+            table.setHorizontalHeaderItem(k, head)
         for i, row in enumerate(self.rows):
             table.setVerticalHeaderItem(i, QTableWidgetItem(row.label))
             for k, text in enumerate(row.cells):

@@ -37,7 +37,9 @@ def test_a_render_is_kept_found_again_and_opened(qtbot: QtBot, tmp_path: Path) -
     table = history.open_table()
     headers = [table.table.horizontalHeaderItem(i).text() for i in range(table.table.columnCount())]  # type: ignore[union-attr]
     assert [text.split("\n")[0] for text in headers] == ["Render 1", "ten bits", "ten bits"]
-    assert [row.cells[0] != row.cells[1] for row in table.rows] == [True]
+    assert [row.label for row in table.rows if row.cells[0] != row.cells[1]] == ["Sensor: Bit depth"]
+    assert table.developed.text().startswith("The project is now at") and "12 bit" in table.developed.text()
+    assert "ten bits, ten bits: developed by other settings" in table.developed.text()
     table.table.setCurrentCell(0, 0)
     assert not table.open_button.isEnabled()
     table.table.setCurrentCell(0, 2)
@@ -77,6 +79,47 @@ def test_figures_stand_beside_the_settings_that_they_were_measured_with(qtbot: Q
     opened = open_render(session, again)
     other = develop_again(opened.frame, development(opened.project, longer))
     assert np.array_equal(other[0].pixels, images[0].pixels) and opened.final
+
+
+def test_the_table_says_by_which_settings_its_figures_are(qtbot: QtBot, tmp_path: Path) -> None:
+    """A render named by its exposure had the figures of another one, and the exposure stood nowhere."""
+    file = tmp_path / "project.json"
+    project = small_project().replaced({"sensor.exposure_time": 0.001}).save(file)
+    session = Session(Document(project, file))
+    history = History(session)
+    qtbot.addWidget(history)
+    world, frame = small_render()
+    session.add_render(Render(1, project, world, frame, name="short-1ms"))
+    keep_render(session, session.renders[0], "short-1ms")
+    table = history.open_table()
+    assert table.developed.text().startswith("All developed as the project is now: 1 ms, gain by full well, 12 bit, ")
+    assert "maximum likelihood" in table.developed.text() and "Keep with the project" in table.developed.text()
+    longer = session.project.replaced({"sensor.exposure_time": 0.01})
+    how = development(project, longer)
+    session.renders[0].made_from["measurements"] = frame, how
+    session.renders[0].measurements = measure_again(
+        frame, world, how, develop_again(frame, how), ("likelihood",), cancelled=lambda: False
+    )
+    assert session.set(("sensor", "exposure_time"), 0.01)
+    exposure = next(row for row in table.rows if row.label == "Sensor: Exposure time")
+    assert exposure.cells == ("10 ms", "1 ms")
+    assert "The project is now at 10 ms" in table.developed.text()
+    tips = {action.text(): action.toolTip() for action in history.menu_of(history.list.item(0)).actions()}
+    assert "keeps no settings" in tips["Rename"] and "figures" in tips["Keep with the project"]
+    table.close()
+
+
+def test_a_column_of_another_scale_is_said_not_to_be_the_scanners(qtbot: QtBot, tmp_path: Path) -> None:
+    session = Session(Document(small_project()))
+    history = History(session)
+    qtbot.addWidget(history)
+    world, frame = small_render()
+    session.add_render(Render(1, small_project(), world, frame))
+    session.add_render(Render(2, small_project(), world, frame, image_scale=0.25))
+    table = history.open_table()
+    assert table.table.horizontalHeaderItem(1).text().endswith("image scale 0.25")  # type: ignore[union-attr]
+    assert "Render 2: Measured at image scale 0.25: not the scanner's figures." in table.told.text()
+    table.close()
 
 
 def test_a_render_is_kept_without_measures_of_a_laser_that_it_does_not_have(qtbot: QtBot, tmp_path: Path) -> None:
