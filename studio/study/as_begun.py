@@ -1,4 +1,4 @@
-"""What a study that goes on reads off its projects: as its folder has it, unless what it asks for has changed."""
+"""What a study that goes on takes over from its folder, and what sets it apart from the study that is there."""
 
 from __future__ import annotations
 
@@ -9,17 +9,23 @@ from typing import Any
 
 from render.base.errors import InputError
 from studio.project.project import READ_OFF, Project
+from studio.study.changes import changes
 from studio.study.store import FILE, described
-from studio.study.study import Study, parts_of
+from studio.study.study import Study, field_place, parts_of
+
+OF_NO_CELL = ("name", "extraction.method")
+"""Fields that a cell has of its own, or does not have, whatever a study varies."""
+MOST_TOLD = 4
 
 
 def as_begun(study: Study, bases: Mapping[str, Project], begun: Mapping[str, Project]) -> dict[str, Project]:
     """Base projects for a study whose folder was begun with others.
 
-    Measures of the part and the report that were changed since, and that the study does not ask for, are as they were,
-    so that every row of the folder has the same columns and none is measured twice.
+    What no cell takes of its base is as it was: a field that every sweep gives values of its own, and measures of the
+    part and the report that the study does not ask for. So every row of the folder has the same columns and none is
+    measured twice.
     """
-    return {name: _one(study, base, begun.get(name)) for name, base in bases.items()}
+    return {name: _one(study, name, base, begun.get(name)) for name, base in bases.items()}
 
 
 def begun_in(folder: Path, study: Study, bases: Mapping[str, Project]) -> dict[str, Project]:
@@ -30,10 +36,60 @@ def begun_in(folder: Path, study: Study, bases: Mapping[str, Project]) -> dict[s
     return dict(bases)
 
 
-def _one(study: Study, base: Project, begun: Project | None) -> Project:
-    if begun is None or base.read_as(begun) != begun or _asked(study, base) != _asked(study, begun):
+def set_apart(
+    study: Study, bases: Mapping[str, Project], begun: Study, begun_with: Mapping[str, Project]
+) -> tuple[str, ...]:
+    """Each field by which a study is another than that of a folder: "Bit depth: 12 in the folder, 10 now"."""
+    told = []
+    for field, label in (("image_scale", "Image scale"), ("laser", "Laser")):
+        there, now = getattr(begun, field), getattr(study, field)
+        if there != now:
+            told.append(f"{label}: {there:g} in the folder, {now:g} now")
+    for name in dict.fromkeys((*begun.set, *study.set)):
+        there, now = begun.set.get(name, "not fixed"), study.set.get(name, "not fixed")
+        if there != now:
+            told.append(f"{name}, which is fixed: {there} in the folder, {now} now")
+    for name, base in as_begun(study, bases, begun_with).items():
+        before = begun_with.get(name)
+        if before is None:
+            told.append(f"Base project: {', '.join(sorted(begun_with))} in the folder, {name} now")
+            continue
+        read = base if _asked(study, base) != _asked(study, before) else base.read_as(before)
+        told += [f"{one.label}: {one.a} in the folder, {one.b} now" for one in changes(before, read)]
+    return tuple(dict.fromkeys(told))
+
+
+def told_apart(apart: tuple[str, ...]) -> str:
+    """In one line, the first few of them."""
+    more = len(apart) - MOST_TOLD
+    return "; ".join(apart[:MOST_TOLD]) + (f"; and {more} more" if more > 0 else "")
+
+
+def _one(study: Study, name: str, base: Project, begun: Project | None) -> Project:
+    if begun is None or base == begun:
+        return base
+    base = _as_in_no_cell(study, name, base, begun)
+    if base.read_as(begun) != begun or _asked(study, base) != _asked(study, begun):
         return base
     return begun.in_folder(base.folder)
+
+
+def _as_in_no_cell(study: Study, name: str, base: Project, begun: Project) -> Project:
+    """The base with the values that it began with, of the fields that each of its sweeps gives its own."""
+    given = [
+        {*study.set, *sweep.set, *(one.field for one in sweep.vary)}
+        for sweep in study.sweeps
+        if (sweep.base or study.base) == name
+    ]
+    fields = {*OF_NO_CELL, *(set.intersection(*given) if given else ())}
+    data, before = base.model_dump(mode="json"), begun.model_dump(mode="json")
+    for field in sorted(fields):
+        with suppress(InputError):  # of boards or effects, or one that the other project does not have
+            (there, part), (place, own) = field_place(before, field, field), field_place(data, field, field)
+            place[own] = there[part]
+    with suppress(InputError):  # beside other values of now it may not be allowed, and another set-up stays one
+        return Project.from_data(data, name).in_folder(base.folder)
+    return base
 
 
 def _asked(study: Study, project: Project) -> Any:

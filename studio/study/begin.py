@@ -6,12 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from render.base.errors import InputError
 from render.base.full_disk import require_room
 from studio.project.project import Project
 from studio.runtime.workers import Engine
 from studio.scan.folder_lock import hold
+from studio.study.as_begun import set_apart, told_apart
 from studio.study.cells import WHOLE, Shard, check_size, next_cells
-from studio.study.store import Store
+from studio.study.store import FILE, Store, described
 from studio.study.study import Study
 
 ROW_BYTES, CHART_BYTES = 2500, 250_000
@@ -32,9 +34,27 @@ def begin(
     engine.check()
     there = sum(file.stat().st_size for file in folder.iterdir() if file.is_file()) if folder.is_dir() else 0
     require_room(folder, study_bytes(study, len(cells)) - there, "the study")
+    _check_alike(folder, study, bases)
     with hold(folder), Store(folder, study.digest(bases)) as store:
         store.describe(study, bases)
         yield store
+
+
+def _check_alike(folder: Path, study: Study, bases: dict[str, Project]) -> None:
+    """InputError: the folder holds another study, and by which fields."""
+    if not (folder / FILE).is_file():
+        return
+    try:
+        there = described(folder)
+    except InputError:  # told where the store is opened
+        return
+    if apart := set_apart(study, bases, *there):
+        raise InputError(
+            "the folder holds another study",
+            where=str(folder),
+            found=told_apart(apart),
+            cure="choose another folder with --out; only values, methods and repeats may be added to this one",
+        )
 
 
 def study_bytes(study: Study, cells: int) -> int:

@@ -13,7 +13,7 @@ from studio.runtime.console import StageProgress
 from studio.runtime.workers import EVERY_PROCESSOR, Engine
 from studio.scan.folder_lock import hold
 from studio.study.answers import Answer, answers
-from studio.study.as_begun import begun_in
+from studio.study.as_begun import begun_in, set_apart
 from studio.study.begin import begin
 from studio.study.cells import Cell, cells_at, row_of
 from studio.study.store import Row, Store, described
@@ -37,6 +37,10 @@ class Found:
     def is_of(self, study: Study, bases: Mapping[str, Project]) -> bool:
         """Whether a study's cells may join it: its numbers are decided by the same things."""
         return self.study.digest(dict(self.bases)) == study.digest(dict(bases))
+
+    def set_apart(self, study: Study, bases: Mapping[str, Project]) -> tuple[str, ...]:
+        """The fields by which a study is another than this one, with their values."""
+        return set_apart(study, bases, self.study, self.bases)
 
     def cell_of(self, number: int, spot: int) -> Cell:
         """The cell behind a spot of a sweep's chart: of its repeats the one that is nearest to their mean."""

@@ -61,10 +61,14 @@ class LongWork(QObject):
     def _end(self, job: object) -> None:
         if job is self.job and isinstance(job, Job):
             self.job = None
-            if job.state is State.CANCELLED:
-                self.session.message.emit("info", f"The {self.NAME} was stopped; Go on continues it: {self.folder}")
             self.state_changed.emit()
             self._after_run()
+            if job.state is State.CANCELLED:
+                self.session.message.emit("info", f"The {self.NAME} was stopped; {self._how_on()}: {self.folder}")
+
+    def _how_on(self) -> str:
+        """What a person can do about a run that was stopped."""
+        return "Go on continues it"
 
     def _after_run(self) -> None:
         """However it ended."""

@@ -19,22 +19,21 @@ from render.base.threads import Cancel
 from studio.editing.forms import FieldSpec
 from studio.project.document import FieldPath
 from studio.project.project import Project
-from studio.project.templates import DESCRIPTIONS, FOLDER
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.long_work import LongWork
 from studio.qt.core.session import Session
 from studio.runtime.jobs import Progress
-from studio.study.as_begun import as_begun
+from studio.study.as_begun import as_begun, told_apart
+from studio.study.base_name import base_from, base_name
 from studio.study.draft import Data, by_names, finished, new_draft, path_text, suggested, varies_nothing
 from studio.study.estimate import Costs, Estimate, costs, estimate
 from studio.study.folder_run import Found, in_window, opened, run_into
 from studio.study.kept_draft import keep_draft, kept_draft
-from studio.study.study import Study, base_project
+from studio.study.study import Study
 
-OF_ANOTHER = (
-    "The folder holds a study of another set-up: the project, a measure that it asks for, what is fixed or the image "
-    "scale has changed since. Choose another folder, or undo the change."
-)
+OF_ANOTHER = "The folder holds a study of another set-up. {}. Choose another folder, or undo the change."
+NOT_AS_IT_IS = "it does not go on as it is set up now, which the Study workspace explains; what was measured is kept"
+SOMETHING = "Something that it is measured on has changed since"
 REST_MS = 250
 """Without a change before it is worked out what the study takes."""
 
@@ -79,6 +78,8 @@ class StudyWork(LongWork):
         """Why the draft is no study."""
         self.failure = ""
         """Why the last thing that was asked for could not be done."""
+        self._told_to_go_on = False
+        """The last that was said of it is that Go on continues it."""
         self._timed: dict[str, Costs] = {}
         self._run_bases: dict[str, Project] = {}
         self._rest = QTimer(self, singleShot=True, interval=REST_MS)
@@ -90,11 +91,7 @@ class StudyWork(LongWork):
     @property
     def base_name(self) -> str:
         """What a study's file calls the open project: a template by its name, else the project's file."""
-        document = self.session.document
-        if document.path is not None:
-            return document.path.name
-        template = document.root.parent == FOLDER and document.root.name in DESCRIPTIONS
-        return document.root.name if template else "project.json"
+        return base_name(self.session.document)
 
     @property
     def sweep(self) -> Data:
@@ -196,7 +193,7 @@ class StudyWork(LongWork):
 
         try:
             study = self.study()
-            base = self._base_from(file.parent, study)
+            base = base_from(file.parent, study.base, self.session.document, self.loaded)
             data = study.model_copy(update={"base": base}).model_dump(mode="json", exclude_defaults=True)
             with atomic_write(file) as temporary:
                 temporary.write_text(pretty({"schema_version": 1, **data}) + "\n", encoding="utf-8")
@@ -222,7 +219,10 @@ class StudyWork(LongWork):
         if self.found is not None and not self.found.is_of(study, bases):
             self.estimate = None
             self.unseen.cancel("estimate")
-            self._tell(OF_ANOTHER)
+            self._tell(OF_ANOTHER.format(told_apart(self.found.set_apart(study, bases)) or SOMETHING))
+            if self._told_to_go_on and not self.running:
+                self._told_to_go_on = False
+                self.session.message.emit("info", f"The study was stopped; {NOT_AS_IT_IS}: {self.folder}")
             return
         self._tell("")  # what was wrong before no longer is
         rows = self.found.rows if self.found is not None else {}
@@ -343,6 +343,10 @@ class StudyWork(LongWork):
     def _after_run(self) -> None:
         self.look_ahead()
 
+    def _how_on(self) -> str:
+        self._told_to_go_on = not self.problem
+        return NOT_AS_IT_IS if self.problem else super()._how_on()
+
     def _said(self, error: InputError) -> str:
         return by_names(in_window(error), self.draft)
 
@@ -379,18 +383,3 @@ class StudyWork(LongWork):
         path = self._document.path
         if path is not None and self._changed and not self.loaded:
             keep_draft(path, self.draft)
-
-    def _base_from(self, folder: Path, study: Study) -> str:
-        """How a study's file in a folder calls its base. InputError: no path leads there."""
-        document = self.session.document
-        own = self.loaded.get(study.base, self.session.project)
-        if study.base in DESCRIPTIONS and own == base_project(study.base, folder):
-            return study.base
-        path = document.path
-        cure = "save the project, then the study beside it or in a folder above"
-        if study.base in self.loaded or path is None or document.dirty:
-            raise InputError("the study's base project is in no file beside it", where=study.base, cure=cure)
-        try:
-            return path.resolve().relative_to(folder.resolve()).as_posix()
-        except ValueError:
-            raise InputError("a study's file stands beside its base project", where=str(path), cure=cure) from None

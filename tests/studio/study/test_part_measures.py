@@ -12,7 +12,9 @@ import pytest
 from analysis.gauges.gauge import Gauge
 from render.base.errors import InputError
 from studio.project.project import Project
-from studio.study.as_begun import begun_in
+from studio.runtime.workers import Engine
+from studio.study.as_begun import begun_in, set_apart
+from studio.study.begin import begin
 from studio.study.cells import next_cells
 from studio.study.measures import measure_of, part_names
 from studio.study.measuring import measure_task
@@ -101,3 +103,20 @@ def test_a_folder_that_goes_on_keeps_the_measures_that_it_was_begun_with(tmp_pat
     now = {"step_block": base.replaced({"measures": []}).in_folder(base.folder)}
     assert begun_in(tmp_path, varied, now) == now
     assert begun_in(tmp_path / "other", study, now) == now
+
+
+def test_another_set_up_is_told_by_the_fields_that_differ(tmp_path: Path) -> None:
+    study, bases = study_of("depth_rmse")
+    with Store(tmp_path, study.digest(bases)) as store:
+        store.describe(study, bases)
+    base = bases["step_block"]
+    now = {"step_block": base.replaced({"sensor.bits": 8, "measured_in": "upright"}).in_folder(base.folder)}
+    smaller = study.model_copy(update={"image_scale": 0.031})
+    told = set_apart(smaller, now, study, bases)
+    assert (
+        len(told) == 2
+        and told[0].startswith("Image scale: ")
+        and told[1] == "Sensor: Bit depth: 12 in the folder, 8 now"
+    )
+    with pytest.raises(InputError, match="Bit depth: 12 in the folder, 8 now"), begin(tmp_path, study, now, Engine(1)):
+        pass

@@ -47,7 +47,7 @@ def test_measures_of_the_part_that_it_does_not_ask_for_leave_it_going_on(qtbot: 
     qtbot.waitUntil(lambda: work.estimate is not None)
     work.change_sweep(measure="length_error:Step")
     work.look_ahead()
-    assert "a measure that it asks for" in work.problem
+    assert "Measures: Step: not there in the folder, there now" in work.problem
 
 
 def test_a_measure_that_it_asks_for_counts(qtbot: QtBot, work: StudyWork) -> None:
@@ -62,7 +62,7 @@ def test_a_measure_that_it_asks_for_counts(qtbot: QtBot, work: StudyWork) -> Non
         ("measures",), (GAUGE.model_copy(update={"regions": ((-0.06, -0.05), (-0.03, -0.018))}), other)
     )
     work.look_ahead()
-    assert "a measure that it asks for" in work.problem
+    assert "Measures: Step: Regions:" in work.problem
 
 
 def test_a_chosen_method_has_a_tick_in_its_colour(qtbot: QtBot, work: StudyWork) -> None:

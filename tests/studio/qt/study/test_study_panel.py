@@ -391,7 +391,37 @@ def test_a_project_that_has_changed_since_is_told_in_place_of_going_on(
     assert desk.session.set(POWER, 0.033)
     desk.work.look_ahead()
     assert "study of another set-up" in desk.panel.problem.text() and not desk.panel.foot.run.isEnabled()
+    assert "Power: 20 mW in the folder, 33 mW now" in desk.panel.problem.text()
     desk.session.document.undo()
     desk.work.look_ahead()
     assert desk.work.problem == ""
     qtbot.waitUntil(lambda: desk.work.estimate is not None)
+
+
+def test_the_projects_own_value_of_a_field_that_is_varied_leaves_it_going_on(
+    desk: Desk, qtbot: QtBot, tmp_path: Path
+) -> None:
+    """Nor do the project's method and name lock it out: no cell takes them of its base."""
+    desk.small([2.0, 20.0])
+    desk.work.choose_folder(tmp_path / "out")
+    run(qtbot, desk)
+    assert desk.session.set(NOISE, 7.0) and desk.session.set(("name",), "another name")
+    assert desk.session.set(("extraction", "method"), "gaussian")
+    desk.small([2.0, 20.0, 30.0])
+    desk.work.look_ahead()
+    assert desk.work.problem == ""
+    run(qtbot, desk)
+    assert desk.work.failure == "" and desk.work.found is not None and len(desk.work.found.rows) == 3
+
+
+def test_a_stopped_study_is_not_said_to_go_on_where_it_does_not(desk: Desk, qtbot: QtBot, tmp_path: Path) -> None:
+    told: list[str] = []
+    desk.small([2.0, 20.0])
+    desk.work.choose_folder(tmp_path / "out")
+    run(qtbot, desk)
+    desk.session.message.connect(lambda _, text: told.append(text))
+    assert desk.work._how_on() == "Go on continues it"
+    assert desk.session.set(POWER, 0.033)
+    desk.work.look_ahead()
+    assert len(told) == 1 and "does not go on as it is set up now" in told[0]
+    assert desk.work._how_on() in told[0]
