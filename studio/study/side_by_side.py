@@ -55,10 +55,10 @@ def side_by_side(renders: Sequence[Kept], now: Project | None = None) -> list[Ro
         values = [one.figures.get(name, math.nan) for one in renders]
         if not any(map(math.isfinite, values)):
             continue
-        own = unit == PIXELS and not one_scale  # pixels of another size have no difference
-        alike = [one.image_scale == first.image_scale or not own for one in renders]
+        apart = unit == PIXELS and not one_scale  # pixels of another size have no difference
+        alike = [one.image_scale == first.image_scale or not apart for one in renders]
         cells = [_cell(value, values[0] if k and alike[k] else math.nan) for k, value in enumerate(values)]
-        label = f"{name} / {unit}" + (" of its own image" if own else "")
+        label = f"{name} / {unit}" + (" of its own image" if apart else "")
         rows.append(Row(label, tuple(cells), True, tuple(values)))
     rows += _measures(renders)
     developed = _developed_rows(renders, now)

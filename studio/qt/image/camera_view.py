@@ -44,6 +44,7 @@ LEAST_HEIGHT = 260
 """px, from which names of lines may have a row of their own."""
 SATURATED_NAME = "Saturated"
 LIVE = "Live estimate"
+OF_A_CELL = "Not of the project: the picture is of a study's cell, with values of its own."
 
 
 class CameraView(QWidget):
@@ -239,6 +240,8 @@ class CameraView(QWidget):
             )
         elif self.is_live:
             text = "Live estimate: one ray a pixel, no noise."
+        elif shown.cell:
+            text = f"{OF_A_CELL} {shown.name}"
         elif not shown.final:
             text = "Still refining." if self.session.dragging else ""
         else:

@@ -14,7 +14,7 @@ from render.base.errors import InputError
 from render.base.threads import Cancel
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner
 from studio.qt.core.session import Render, Session
-from studio.runtime.jobs import Progress
+from studio.runtime.jobs import Job, Progress
 
 if TYPE_CHECKING:
     from studio.notebook.frame import RenderedFrame
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from studio.study.folder_run import Found
 
 
-READY = "The cell's frame is ready: a click on its point opens it in Measure; it is in the list of Render as well"
+UNDER_WAY = "The cell of the study is still being rendered; it will be in the list of renders, and what is shown stays"
+READY = "The cell “{}” is ready in the list of renders; a click on its point in the chart opens it in Measure"
 
 
 class CellOpener(QObject):
@@ -35,9 +36,12 @@ class CellOpener(QObject):
         super().__init__(session)
         self.session = session
         self._waited_for = False
+        self._job: Job[RenderedFrame | str] | None = None
 
     def go_on(self) -> None:
         """The person does something else: what is being rendered is not to come in between."""
+        if self._waited_for and self._job is not None and not self._job.ended:
+            self.session.message.emit("info", UNDER_WAY)
         self._waited_for = False
 
     def open(self, found: Found, number: int, spot: int, jobs: JobRunner) -> None:
@@ -69,7 +73,7 @@ class CellOpener(QObject):
             elif session.document is document:
                 self._take(found, number, cell, frame, self._waited_for and session.shown is before)
 
-        jobs.run(RENDER, "cell of the study", work, then)
+        self._job = jobs.run(RENDER, "cell of the study", work, then)
 
     def _take(self, found: Found, number: int, cell: Cell, frame: RenderedFrame, show: bool) -> None:
         from studio.study.labels import value_text
@@ -91,7 +95,7 @@ class CellOpener(QObject):
         if not show:
             self.session.renders.append(made)
             self.session.renders_changed.emit()
-            self.session.message.emit("info", READY)
+            self.session.message.emit("info", READY.format(made.name))
             return
         self.session.add_render(made)
         told = f"Repeat {cell.repeat + 1} of {found.study.repeats}, rendered again: a study keeps numbers, no frames"

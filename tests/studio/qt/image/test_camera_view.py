@@ -121,6 +121,14 @@ def test_a_changed_scene_makes_the_render_stale_and_goes_live(qtbot, made):
     assert not made.session.stale and not made.badge.isVisible()
 
 
+def test_the_picture_of_a_studys_cell_says_so_beside_the_projects_values(qtbot, made):
+    shown = made.session.shown
+    shown.cell, shown.name = "a key", "Sweep 1: 5 mW, repeat 1"
+    made.session.renders_changed.emit()
+    assert made.badge.isVisible() and "a study's cell" in made.badge_text.text()
+    assert "5 mW" in made.badge_text.text()
+
+
 def test_exposure_does_not_make_it_stale(qtbot, made):
     made.session.set(("sensor", "exposure_time"), 0.1)
     assert not made.session.stale and not made.is_live

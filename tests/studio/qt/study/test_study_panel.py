@@ -285,8 +285,12 @@ class TestRun:
         desk.charts.opener.opened.connect(lambda: told.append("opened"))
         desk.charts.open(0)
         desk.charts.opener.go_on()
+        assert told[-1].startswith("The cell of the study is still being rendered")
         qtbot.waitUntil(lambda: bool(desk.session.renders))
-        assert desk.session.shown is None and told[-1].startswith("The cell's frame is ready")
+        assert desk.session.shown is None
+        assert told[-1].startswith(f"The cell “{desk.session.renders[0].name}” is ready in the list of renders")
+        desk.charts.opener.go_on()
+        assert "is ready" in told[-1]
         with qtbot.waitSignal(desk.charts.opener.opened):
             desk.charts.open(0)
         assert desk.session.shown is desk.session.renders[0]
