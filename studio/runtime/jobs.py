@@ -76,6 +76,8 @@ class Job(Generic[Result]):
         self.done = 0.0
         self.there = 0.0
         """Share of the work that an earlier run has done: it is found in no time, which is no measure of the rest."""
+        self.start_up: float | None = None
+        """s before what is counted was begun, where the work tells; None: judged by the first progress."""
         self.result: Result | None = None
         self.problem: Problem | None = None
         self._work = work
@@ -112,7 +114,7 @@ class Job(Generic[Result]):
         enough = 0.01 if self.seconds >= LONG_WORK else SMALL_SHARE
         if self.ended or self.done - self.there < enough * (1.0 - self.there) or self.seconds < EARLIEST_ESTIMATE:
             return None
-        begun, first = self._begun
+        begun, first = self._begun if self.start_up is None else (self.start_up, 0.0)
         if self.done <= first:
             return None
         # time that passes since the work told how far it is makes what is left less, not more

@@ -67,14 +67,17 @@ def run_into(
     progress: StageProgress = lambda stage, done: None,
     cancelled: Callable[[], bool] = lambda: False,
     grew: Callable[[Found], None] = lambda found: None,
+    started: Callable[[float], None] = lambda seconds: None,
 ) -> Found:
-    """Measure what is missing, then write tables, charts and page. grew: hears what is found as it grows.
+    """Measure what is missing, then write tables, charts and page. grew: hears what is found as it grows; started: how
+    many seconds had passed when the first cells were begun.
 
     InputError: as `begin` and `run_study`. Cancelled: so asked; what has been measured is kept.
     """
     from studio.study.runner import run_study  # takes a while: not before a study runs
 
     progress("preparing", 0.0)
+    called = time.monotonic()
     bases = begun_in(folder, study, bases)
     with begin(folder, study, bases, engine) as store:
         before, next_look = store.count(), 0.0
@@ -90,7 +93,15 @@ def run_into(
                 next_look = now + spent / SHARE
 
         try:
-            run_study(study, bases, store, engine=engine, progress=tell, cancelled=cancelled)
+            run_study(
+                study,
+                bases,
+                store,
+                engine=engine,
+                progress=tell,
+                cancelled=cancelled,
+                begun=lambda at: started(at - called),
+            )
         finally:
             found = found_in(study, bases, store.rows())
             grew(found)

@@ -16,12 +16,17 @@ from studio.study.draft import Data, varies_nothing
 
 KEPT = 100
 """Of the last projects."""
+RESULTS = "results"
+"""Beside what a study's file has: its folder."""
 LARGEST = 1 << 20
 """Bytes of a file that is read."""
 
 
-def keep_draft(project: Path, draft: Data) -> None:
-    """Of the project's file. A draft that varies nothing is nothing to keep; a full disk keeps none and is no fault."""
+def keep_draft(project: Path, draft: Data, folder: Path | None = None) -> None:
+    """Of the project's file, with its folder of results.
+
+    A draft that varies nothing is nothing to keep; a full disk keeps none and is no fault.
+    """
     file = _file(project)
     with contextlib.suppress(OSError):
         if not any(map(_asks, draft["sweeps"])):
@@ -29,7 +34,8 @@ def keep_draft(project: Path, draft: Data) -> None:
             return
         file.parent.mkdir(parents=True, exist_ok=True)
         with atomic_write(file) as temporary:
-            temporary.write_text(json.dumps(draft), encoding="utf-8")
+            kept = draft if folder is None else {**draft, RESULTS: str(folder.resolve())}
+            temporary.write_text(json.dumps(kept), encoding="utf-8")
         others = sorted(file.parent.glob("*.json"), key=lambda other: other.stat().st_mtime)
         for old in others[:-KEPT]:
             old.unlink(missing_ok=True)
@@ -37,14 +43,28 @@ def keep_draft(project: Path, draft: Data) -> None:
 
 def kept_draft(project: Path, base: str) -> Data | None:
     """As it was kept, of the open project by its name in studies; None: there is none, or it is none any more."""
+    draft = {name: value for name, value in _read(project).items() if name != RESULTS} | {"base": base}
+    return draft if _is_draft(draft) else None
+
+
+def kept_folder(project: Path) -> Path | None:
+    """Where the results of the kept study are; None: there are none, or the folder is there no longer."""
+    name = _read(project).get(RESULTS)
+    folder = Path(name) if isinstance(name, str) else None
+    with contextlib.suppress(OSError, ValueError):
+        return folder if folder is not None and folder.is_dir() else None
+    return None
+
+
+def _read(project: Path) -> Data:
+    """What is kept; empty: nothing that can be read."""
     file = _file(project)
     try:
         if file.stat().st_size > LARGEST:
-            return None
-        draft = json.loads(file.read_text(encoding="utf-8")) | {"base": base}
+            return {}
+        return dict(json.loads(file.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
-        return None
-    return dict(draft) if _is_draft(draft) else None
+        return {}
 
 
 def _is_draft(draft: Data) -> bool:

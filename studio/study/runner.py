@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -30,11 +31,13 @@ def run_study(
     shard: Shard = WHOLE,
     progress: Progress = lambda done, known: None,
     cancelled: Cancel = lambda: False,
+    begun: Callable[[float], None] = lambda at: None,
 ) -> None:
     """Measure what is missing. Every task's rows are kept as it ends, so that nothing is lost or done twice.
 
     InputError: a field, value or base that does not fit, told before anything runs; workers that are lost again and
-    again. Cancelled: so asked; what has been measured is kept.
+    again. Cancelled: so asked; what has been measured is kept. begun: hears, with the first cells, by `time.monotonic`
+    when they were begun, as far as workers take time to start.
     """
     missing = next_cells(study, bases, store.rows(), shard)
     if not missing:
@@ -54,10 +57,14 @@ def run_study(
         known += len(cells)
         return tasks(cells, study.image_scale, study.laser)
 
+    first_told = False
     work = tasks(_searches_first(study, missing), study.image_scale, study.laser)
     progress(done, known)
     with team(engine, _measure, begin, cancelled) as workers:
-        for _, found in workers.results(work, cancelled, "the study", follow):
+        for _, (seconds, found) in workers.results(work, cancelled, "the study", follow):
+            if not first_told:
+                begun(time.monotonic() - seconds)
+                first_told = True
             store.add(found)
             measured += [key for key, _, _ in found]
             done += len(found)
@@ -73,7 +80,9 @@ def _measure(task: Task, cancelled: Cancel) -> Any:
     # not at the top: measuring takes libraries that the driver of several workers does without
     from studio.study.measuring import measure_task
 
-    return measure_task(task, cancelled)
+    start = time.monotonic()
+    found = measure_task(task, cancelled)
+    return time.monotonic() - start, found
 
 
 def _warm_up(text: str, folder: str, methods: tuple[Method, ...]) -> None:

@@ -1,4 +1,4 @@
-"""How a study's file calls the project that it is of."""
+"""A study as a file, and how that calls the project that it is of."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from render.base.errors import InputError
+from render.base.files import atomic_write
 from studio.project.document import Document
 from studio.project.project import Project
+from studio.project.strict_json import pretty
 from studio.project.templates import DESCRIPTIONS, FOLDER
-from studio.study.study import base_project
+from studio.study.study import Study, base_project
 
 
 def base_name(document: Document) -> str:
@@ -20,7 +22,15 @@ def base_name(document: Document) -> str:
     return document.root.name if template else "project.json"
 
 
-def base_from(folder: Path, base: str, document: Document, loaded: Mapping[str, Project]) -> str:
+def write_study(file: Path, study: Study, document: Document, loaded: Mapping[str, Project]) -> None:
+    """Of the open document, or of bases that came from files. InputError: it cannot be written, or finds no base."""
+    base = _base_from(file.parent, study.base, document, loaded)
+    data = study.model_copy(update={"base": base}).model_dump(mode="json", exclude_defaults=True)
+    with atomic_write(file) as temporary:
+        temporary.write_text(pretty({"schema_version": 1, **data}) + "\n", encoding="utf-8")
+
+
+def _base_from(folder: Path, base: str, document: Document, loaded: Mapping[str, Project]) -> str:
     """The base of a study whose file is to stand in a folder. loaded: bases that came from files.
 
     InputError: no path leads there.

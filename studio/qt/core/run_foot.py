@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
-from studio.qt.core.jobs import time_left
+from studio.qt.core.jobs import duration, time_left
 from studio.qt.core.widgets import ElidedLabel, flush, text_button, thin_bar
 from studio.runtime.jobs import Job, State
 
@@ -58,8 +58,11 @@ class RunFoot(QWidget):
             self.stage.clear()
         self.folder.setText(str(folder) if folder is not None else "no folder yet")
 
-    def tell_progress(self, job: Job[object]) -> None:
+    def tell_progress(self, job: Job[object], promised: float | None = None) -> None:
+        """promised: s that it was estimated to take, which is not to stand uncorrected while nothing is done."""
         self.bar.setMaximum(1000 if job.done > 0.0 else 0)  # to and fro until there is a share to show
         self.bar.setValue(round(1000 * job.done))
         left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
+        if job.done == 0.0 and promised is not None and job.seconds > promised:
+            left = f"longer than the {duration(promised)} that were estimated"
         self.stage.setText("stopping" if job.cancel_asked else f"{job.stage}   {left}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from pathlib import Path
 
@@ -23,10 +22,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from render.base.threads import thread_count
 from studio.qt.core.folders import ask_results_folder
 from studio.qt.core.icons import icon_button
-from studio.qt.core.jobs import JobRunner
+from studio.qt.core.jobs import JobRunner, duration
 from studio.qt.core.run_foot import RunFoot
 from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import Scrolled, align_labels, flush, text_button
@@ -86,9 +84,7 @@ class StudyPanel(QWidget):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        self.work.watched = True
-        if not self.work.running:
-            self.work.look_ahead()
+        self.work.look()
 
     def hideEvent(self, event: QHideEvent) -> None:
         self.work.watched = False
@@ -207,7 +203,7 @@ class StudyPanel(QWidget):
         self.problem.setText(work.failure or work.problem)
         self.problem.setVisible(bool(self.problem.text()))
         if work.estimate is not None:
-            self.told.setText(estimate_text(work.estimate, self._processors()))
+            self.told.setText(estimate_text(work.estimate, work.processors))
         else:
             self.told.setText("" if work.problem else EMPTY if empty else "Working out what it takes…")
         self.told.setObjectName("muted" if empty else "")
@@ -215,16 +211,13 @@ class StudyPanel(QWidget):
         self.time.setVisible(work.estimate is not None and work.estimate.seconds is None and not work.running)
         self._show_state()
 
-    def _processors(self) -> int:
-        return thread_count(self.work.engine.workers)
-
     def _tell_timing(self, job: Job[object]) -> None:
         if job.stage:
             self.told.setText(job.stage)
 
     def _tell_progress(self, job: Job[object]) -> None:
         if job is self.work.job:
-            self.foot.tell_progress(job)
+            self.foot.tell_progress(job, self.work.promised)
 
     def _show_state(self) -> None:
         work = self.work
@@ -289,11 +282,3 @@ def estimate_text(told: Estimate, processors: int) -> str:
         parts.append(f"about {duration(told.seconds / processors)} on {processors} processors")
     parts.append(f"{told.bytes / 1e6:.1f} MB")
     return ", ".join(parts)
-
-
-def duration(seconds: float) -> str:
-    """To the second below a minute, to the minute from an hour."""
-    if seconds < 60.0:
-        return f"{max(1, math.ceil(seconds))} s"
-    minutes = round(seconds / 60.0)
-    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,35 +14,28 @@ from typing import Any
 from PySide6.QtCore import QTimer, Signal
 
 from render.base.errors import InputError
-from render.base.threads import Cancel
+from render.base.threads import thread_count
 from studio.editing.forms import FieldSpec
 from studio.project.document import FieldPath
 from studio.project.project import Project
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.long_work import LongWork
 from studio.qt.core.session import Session
-from studio.runtime.jobs import Progress
+from studio.qt.study.study_jobs import Ended, estimating, reading, running
 from studio.study.as_begun import as_begun, told_apart
-from studio.study.base_name import base_from, base_name
 from studio.study.draft import Data, by_names, finished, new_draft, path_text, suggested, varies_nothing
-from studio.study.estimate import Costs, Estimate, costs, estimate
-from studio.study.folder_run import Found, in_window, opened, run_into
-from studio.study.kept_draft import keep_draft, kept_draft
+from studio.study.estimate import Costs, Estimate
+from studio.study.folder_run import Found, in_window, run_into
+from studio.study.kept_draft import keep_draft, kept_draft, kept_folder
+from studio.study.store import FILE
 from studio.study.study import Study
+from studio.study.study_file import base_name, write_study
 
 OF_ANOTHER = "The folder holds a study of another set-up. {}. Choose another folder, or undo the change."
 NOT_AS_IT_IS = "it does not go on as it is set up now, which the Study workspace explains; what was measured is kept"
 SOMETHING = "Something that it is measured on has changed since"
 REST_MS = 250
 """Without a change before it is worked out what the study takes."""
-
-
-@dataclass(frozen=True)
-class Ended:
-    """How a run of the study went. problem: why it could not go on, in a sentence."""
-
-    found: Found | None
-    problem: str = ""
 
 
 class StudyWork(LongWork):
@@ -68,6 +60,7 @@ class StudyWork(LongWork):
         self.loaded: dict[str, Project] = {}
         """Base projects of a study that came from a file; empty: it is of the open project."""
         self.draft: Data = self._begun()
+        self.folder = self._kept_folder()
         self._document, self._changed = session.document, False
         """Of which the draft is, and whether it was changed in this window."""
         self.chosen = 0
@@ -78,6 +71,8 @@ class StudyWork(LongWork):
         """Why the draft is no study."""
         self.failure = ""
         """Why the last thing that was asked for could not be done."""
+        self.promised: float | None = None
+        """s of wall time that were told before the run; None: none were."""
         self._told_to_go_on = False
         """The last that was said of it is that Go on continues it."""
         self._timed: dict[str, Costs] = {}
@@ -103,6 +98,11 @@ class StudyWork(LongWork):
         """The base project of the sweep that is edited."""
         own = self.loaded.get(self.sweep.get("base") or self.draft["base"])
         return own if own is not None else self.session.project
+
+    @property
+    def processors(self) -> int:
+        """That a run takes."""
+        return thread_count(self.engine.workers)
 
     def study(self) -> Study:
         """InputError: what the draft lacks."""
@@ -188,15 +188,8 @@ class StudyWork(LongWork):
 
     def save(self, file: Path) -> bool:
         """Write the study's file; False: told in `failure`, nothing is written."""
-        from render.base.files import atomic_write
-        from studio.project.strict_json import pretty
-
         try:
-            study = self.study()
-            base = base_from(file.parent, study.base, self.session.document, self.loaded)
-            data = study.model_copy(update={"base": base}).model_dump(mode="json", exclude_defaults=True)
-            with atomic_write(file) as temporary:
-                temporary.write_text(pretty({"schema_version": 1, **data}) + "\n", encoding="utf-8")
+            write_study(file, self.study(), self.session.document, self.loaded)
         except InputError as error:
             self._fail(self._said(error))
             return False
@@ -204,6 +197,16 @@ class StudyWork(LongWork):
         return True
 
     # what it takes
+
+    def look(self) -> None:
+        """Someone looks: what it takes, once the folder that it was left with is read."""
+        self.watched = True
+        if self.running:
+            return
+        if self.found is None and self.folder is not None:
+            self._read(self.folder, as_it_is=False)
+        else:
+            self.look_ahead()
 
     def look_ahead(self, *, timed: bool = False) -> None:
         """Work out what the draft takes; timed: measure a cell of each sweep for it."""
@@ -228,22 +231,14 @@ class StudyWork(LongWork):
         rows = self.found.rows if self.found is not None else {}
         known = self._timed if not timed else {}
 
-        def work(progress: Progress, cancelled: Cancel) -> Estimate | str:
-            try:
-                for number, sweep in enumerate(study.sweeps if timed else ()):
-                    if not cancelled():
-                        progress(f"timing {sweep.name}", number / len(study.sweeps))
-                        known[sweep.name] = costs(study, bases, number)
-                return estimate(study, bases, rows, known)
-            except InputError as error:
-                return in_window(error)
-
         def then(told: Estimate | str) -> None:
             self._timed = known
             self.estimate = told if isinstance(told, Estimate) else None
             self._tell(told if isinstance(told, str) else "")
 
-        self.unseen.run("estimate", "estimate", work, then, interrupt=True)
+        self.unseen.run(
+            "estimate", "estimate", estimating(study, bases, rows, known, timed=timed), then, interrupt=True
+        )
 
     # the run
 
@@ -257,17 +252,12 @@ class StudyWork(LongWork):
         except InputError as error:
             self._fail(self._said(error))
             return
-        folder, engine, grew = self.folder, self.engine, partial(self._grew.emit, self.folder)
-
-        def work(progress: Progress, cancelled: Cancel) -> Ended:
-            try:
-                found = run_into(folder, study, bases, engine=engine, progress=progress, cancelled=cancelled, grew=grew)
-                return Ended(found)
-            except InputError as error:
-                return Ended(None, in_window(error))
-
+        grew = partial(self._grew.emit, self.folder)
+        work = running(run_into, self.folder, study, bases, self.engine, grew, self._take_start)
         self._fail("")
         self._run_bases = bases
+        seconds = self.estimate.seconds if self.estimate is not None else None
+        self.promised = None if seconds is None else seconds / self.processors
         self._begin(work, self._take_end)
 
     def choose_folder(self, folder: Path) -> None:
@@ -275,6 +265,8 @@ class StudyWork(LongWork):
         if self.running:
             return
         self.folder, self.found, self.failure = folder, None, ""
+        self._changed = True
+        self._keep()
         self.state_changed.emit()
         self.found_changed.emit()
         self._read(folder, as_it_is=False)
@@ -293,15 +285,9 @@ class StudyWork(LongWork):
     # what follows
 
     def _read(self, folder: Path, *, as_it_is: bool) -> None:
-        if not as_it_is and not (folder / "study.sqlite").exists():
+        if not as_it_is and not (folder / FILE).exists():
             self.look_ahead()
             return
-
-        def work(progress: Progress, cancelled: Cancel) -> Ended:
-            try:
-                return Ended(opened(folder))
-            except InputError as error:
-                return Ended(None, in_window(error))
 
         def then(ended: Ended) -> None:
             self._fail(ended.problem)
@@ -318,7 +304,7 @@ class StudyWork(LongWork):
                 self.found_changed.emit()
                 self.look_ahead()
 
-        self.unseen.run("read", "read the study", work, then)
+        self.unseen.run("read", "read the study", reading(folder), then)
 
     def _take(self, bases: dict[str, Project], draft: Data) -> None:
         """Another study in place of this one."""
@@ -329,6 +315,11 @@ class StudyWork(LongWork):
         self.found_changed.emit()
         self.state_changed.emit()
         self.look_ahead()
+
+    def _take_start(self, seconds: float) -> None:
+        """On the job's thread: by it the time left is of what cells take, and not of workers that start."""
+        if self.job is not None:
+            self.job.start_up = seconds
 
     def _take_growth(self, folder: Path, found: Found) -> None:
         if folder == self.folder:
@@ -372,7 +363,14 @@ class StudyWork(LongWork):
             self.loaded = dict(self.found.bases) if self.found is not None else self._run_bases
         else:
             self._take({}, self._begun())
-            self._changed = False
+            self._changed, self.folder = False, self._kept_folder()
+            self.state_changed.emit()
+            if self.watched:
+                self.look()
+
+    def _kept_folder(self) -> Path | None:
+        path = self.session.document.path
+        return kept_folder(path) if path is not None else None
 
     def _begun(self) -> Data:
         """The study of the open project as it was left, else an empty one."""
@@ -382,4 +380,4 @@ class StudyWork(LongWork):
     def _keep(self) -> None:
         path = self._document.path
         if path is not None and self._changed and not self.loaded:
-            keep_draft(path, self.draft)
+            keep_draft(path, self.draft, self.folder)

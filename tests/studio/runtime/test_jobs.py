@@ -267,3 +267,25 @@ def test_a_render_in_a_job_is_cancelled_in_the_middle_of_a_pass() -> None:
     assert job.join(180)
     # a pass of thousands of samples would take minutes; how soon it ends is measured in bench_desktop.py
     assert job.state is State.CANCELLED and len(frames) <= seen + 1 and frames[-1].ambient is not None
+
+
+def test_where_the_work_tells_when_it_began_the_first_batch_is_a_measure_of_the_rest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Four of twelve cells came after 85 s, four more at once: "0:14 left" was told of minutes."""
+    clock = [0.0]
+    monkeypatch.setattr(jobs, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    told, end = threading.Event(), threading.Event()
+
+    def work(progress: Progress, cancelled: Cancel) -> None:
+        clock[0] = 85.0
+        job.start_up = 5.0
+        progress("4 of 12 cells", 4 / 12)
+        told.set()
+        end.wait(180)
+
+    job = Job("study", work)
+    job.start()
+    assert told.wait(180) and job.seconds_left == pytest.approx(160.0)
+    end.set()
+    job.join()

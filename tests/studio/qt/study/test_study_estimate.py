@@ -17,6 +17,7 @@ from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session, one_of
 from studio.qt.study.study_panel import StudyPanel
 from studio.qt.study.study_work import StudyWork
+from studio.runtime.jobs import Job
 from tests.studio.qt.shell.window_hands import until_cancelled
 
 
@@ -62,3 +63,12 @@ def test_while_it_runs_only_what_is_left_is_told(
     assert work.running and panel.told.isHidden()
     work.stop()
     qtbot.waitUntil(lambda: not work.running and panel.told.isVisible())
+
+
+def test_an_estimate_that_is_passed_before_a_cell_is_done_is_said_to_be(panel: StudyPanel) -> None:
+    job: Job[object] = Job("study", lambda progress, cancelled: None)
+    job.stage, job._seconds = "0 of 12 cells", 85.0
+    panel.foot.tell_progress(job, promised=41.0)
+    assert "longer than the 41 s that were estimated" in panel.foot.stage.text()
+    panel.foot.tell_progress(job, promised=100.0)
+    assert "longer" not in panel.foot.stage.text()

@@ -429,3 +429,20 @@ def test_a_stopped_study_is_not_said_to_go_on_where_it_does_not(desk: Desk, qtbo
     desk.work.look_ahead()
     assert len(told) == 1 and "does not go on as it is set up now" in told[0]
     assert desk.work._how_on() in told[0]
+
+
+def test_the_folder_of_results_is_there_again_after_a_kill(desk: Desk, qtbot: QtBot, tmp_path: Path) -> None:
+    """Nothing was closed: what was chosen is kept at once."""
+    desk.small([2.0])
+    desk.work.choose_folder(tmp_path / "out")
+    run(qtbot, desk)
+    file = tmp_path / "plane.json"
+    again = Session(Document(Project.load(file), file))
+    work = one_of(StudyWork, again)
+    assert work.draft == desk.work.draft and work.folder == tmp_path / "out"
+    work.look()
+    qtbot.waitUntil(lambda: work.found is not None and len(work.found.rows) == 1)
+    qtbot.waitUntil(lambda: work.estimate is not None and work.estimate.cells == 0)
+    assert work.problem == ""
+    work.close()
+    live(again).close()
