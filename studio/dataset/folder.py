@@ -88,12 +88,18 @@ def _is_whole(found: dict[str, Any], image: int) -> bool:
     )
 
 
+def is_of(folder: Path, recipe: Recipe, base: Project) -> bool:
+    """Whether a folder holds images of a recipe, with which it can go on. InputError: it cannot be read."""
+    about = folder / ABOUT
+    return about.exists() and read_object(about, "dataset").get("digest") == recipe.digest(base)
+
+
 def begun(folder: Path, recipe: Recipe, base: Project) -> Dataset:
     """The folder for a recipe, new or gone on with. InputError: it holds another dataset, or other files."""
     digest = recipe.digest(base)
     about = folder / ABOUT
     if about.exists():
-        if read_object(about, "dataset").get("digest") != digest:
+        if not is_of(folder, recipe, base):
             raise InputError(
                 "the folder holds another dataset: its recipe or base project differs",
                 where=str(folder),

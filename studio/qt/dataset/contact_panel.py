@@ -11,6 +11,8 @@ from studio.dataset.contact_sheet import Picture
 from studio.qt.core.session import Session, one_of
 from studio.qt.dataset.dataset_work import DatasetWork
 
+PREVIEW = "Preview: {} scenes that the recipe draws"
+"""Whatever the number of those whose images are made."""
 GAP = 6
 LINE = QColor("#e69f00")
 LINE_WIDTH = 1.5
@@ -49,7 +51,9 @@ class ContactPanel(QWidget):
         self.problem.setText(work.problem)
         self.problem.setVisible(bool(work.problem))
         anew = sum(len(picture.rejected) for picture in work.pictures.values())
-        drawn = f"{len(work.pictures)} of {work.shown} scenes"
+        drawn = PREVIEW.format(
+            work.shown if len(work.pictures) == work.shown else f"{len(work.pictures)} of {work.shown}"
+        )
         again = f"; {anew} were drawn anew, as they showed no line" if anew else ""
         self.told.setText(f"{drawn}{again}. The exact line is drawn on the upper half.")
         self.sheet.update()

@@ -14,7 +14,7 @@ from render.base.errors import InputError
 from render.base.files import atomic_write
 from render.base.threads import Cancel
 from studio.dataset.contact_sheet import Picture, pictures
-from studio.dataset.folder import images_in
+from studio.dataset.folder import images_in, is_of
 from studio.dataset.recipe import Recipe, base_of
 from studio.dataset.run import Result, Wanted, make_dataset
 from studio.project.project import Project
@@ -132,6 +132,13 @@ class DatasetWork(LongWork):
     def made(self) -> int:
         """Images that the folder holds whole."""
         return len(images_in(self.folder)) if self.folder is not None and self.folder.is_dir() else 0
+
+    def is_of_recipe(self) -> bool:
+        """The folder holds images of the recipe as it is."""
+        try:
+            return self.folder is not None and self.base is not None and is_of(self.folder, self.recipe, self.base)
+        except InputError:  # told where the images are made
+            return False
 
     def start(self) -> None:
         """Make what is missing in the folder."""

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 from superqt import QRangeSlider
 
+from studio.dataset.field_names import value_name
 from studio.dataset.recipe import Draw
-from studio.editing.forms import PLAIN, words
+from studio.editing.forms import PLAIN
 from studio.editing.units import Unit
+from studio.project.project import Project
 from studio.qt.core.widgets import ElidedLabel
 from studio.qt.forms.unit_box import UnitBox
 
@@ -20,6 +21,8 @@ STEPS = 1000
 """Of the slider."""
 BOX_WIDTH = 112
 """px."""
+MOST_SAID = 30
+"""Of the values of a choice."""
 ROOM = 0.5
 """How far beyond the file's range the slider reaches on either side, in parts of it."""
 
@@ -31,8 +34,9 @@ class DrawRow(QWidget):
     refused = Signal(str)
     """Why what was typed is not taken over."""
 
-    def __init__(self, draw: Draw, label: str, unit: Unit = PLAIN, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, draw: Draw, label: str, unit: Unit = PLAIN, base: Project | None = None) -> None:
+        """base: the project that has the field; None: it cannot be read."""
+        super().__init__()
         self.draw, self.unit = draw, unit
         self.name = ElidedLabel(Qt.TextElideMode.ElideLeft)
         self.name.setText(label)
@@ -43,7 +47,7 @@ class DrawRow(QWidget):
         layout.addWidget(self.name, 0, 0, 1, 3)
         self.boxes: tuple[UnitBox, ...] = ()
         if draw.kind not in RANGED or draw.low is None or draw.high is None:
-            told = QLabel(said(draw), wordWrap=True)
+            told = QLabel(said(draw, unit, base), wordWrap=True)
             told.setObjectName("muted")
             layout.addWidget(told, 1, 0, 1, 3)
             return
@@ -126,15 +130,12 @@ class DrawRow(QWidget):
         return math.exp(value) if self.logarithmic else round(value) if self.draw.kind == "integer" else value
 
 
-def said(draw: Draw) -> str:
+def said(draw: Draw, unit: Unit, base: Project | None) -> str:
     """What is drawn of a field without a range."""
     if draw.kind == "mesh":
         return f"a mesh of {draw.folder}"
-    return "one of " + ", ".join(_short(value) for value in draw.values)
-
-
-def _short(value: Any) -> str:
-    if isinstance(value, dict):
-        own = [str(one) for key, one in value.items() if key != "kind" and not isinstance(one, dict | list)]
-        return " ".join([words(str(value.get("kind", ""))).lower(), *own])
-    return str(value)
+    # alike ones in a row are likelier, not others
+    values = list(dict.fromkeys(value_name(base, draw.field, value, unit) for value in draw.values[:MOST_SAID]))
+    more = len(draw.values) - MOST_SAID
+    between = "; " if any("," in value for value in values) else ", "
+    return "one of " + between.join(values) + (f" and {more} more" if more > 0 else "")

@@ -29,6 +29,7 @@ from studio.qt.dataset.dataset_work import DatasetWork
 from studio.qt.dataset.draw_row import DrawRow
 from studio.runtime.jobs import Job
 
+ALL_THERE = "; a higher number of scenes makes more"
 FILES = "Recipes (*.json);;All files (*)"
 
 
@@ -98,7 +99,7 @@ class RecipePanel(QWidget):
             row.deleteLater()
         base = self.work.base
         self.rows = [
-            DrawRow(draw, *((draw.field, PLAIN) if base is None else field_name(base, draw.field)))
+            DrawRow(draw, *((draw.field, PLAIN) if base is None else field_name(base, draw.field)), base)
             for draw in self.work.recipe.draw
         ]
         for number, row in enumerate(self.rows):
@@ -152,8 +153,12 @@ class RecipePanel(QWidget):
         work = self.work
         there = work.made()
         images = work.scenes * images_of(work.recipe, len(work.base.scene.lasers) if work.base is not None else 1)
-        self.told.setText(f"{images} images of {work.scenes} scenes" + (f"; {there} are there" if there else ""))
+        whole = there >= images and work.is_of_recipe()
+        told = f"; {there} are there" if there else ""
+        self.told.setText(f"{images} images of {work.scenes} scenes{told}{ALL_THERE if whole else ''}")
         self.foot.show_state(work.folder, work.job, begun=there > 0)
+        self.foot.run.setEnabled(not whole)
+        self.foot.run.setToolTip(f"Every image is there{ALL_THERE}" if whole else "")
         for widget in (self.files, self.scenes, self.images, self.seed, *self.rows):
             widget.setEnabled(not work.running)
 

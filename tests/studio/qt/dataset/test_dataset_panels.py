@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from studio.dataset.recipe import Draw, Recipe, ready_made
@@ -116,6 +117,22 @@ def test_pictures_stand_side_by_side_within_the_sheet(desk: Desk, qtbot: QtBot) 
     assert not any(places[k].intersects(other) for k in range(3) for other in places[k + 1 :])
 
 
+def test_the_sheet_is_said_to_be_a_preview(desk: Desk, qtbot: QtBot) -> None:
+    """With two scenes to be made it said "24 of 24 scenes"."""
+    qtbot.waitUntil(lambda: desk.ready)
+    assert desk.sheet.told.text().startswith("Preview: 3 scenes that the recipe draws")
+
+
+def test_values_of_a_choice_have_names_and_units(desk: Desk) -> None:
+    desk.work.load("primitives")
+    told = [" ".join(label.text() for label in row.findChildren(QLabel)) for row in desk.panel.rows]
+    (shapes,) = [text for text in told if "sphere" in text]
+    assert "step block; sphere, radius 30 mm; " in shapes and "cylinder, radius 20 mm, length 150 mm" in shapes
+    (surfaces,) = [text for text in told if "lambertian" in text]
+    assert "lambertian, albedo 0.1; " in surfaces and "conductor, metal steel, roughness 0.1" in surfaces
+    assert any("405 nm, 450 nm" in text for text in told)
+
+
 def test_images_are_made_stopped_and_gone_on_with(desk: Desk, qtbot: QtBot, tmp_path: Path,
                                                  monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
     folder = tmp_path / "images"
@@ -124,9 +141,10 @@ def test_images_are_made_stopped_and_gone_on_with(desk: Desk, qtbot: QtBot, tmp_
     desk.panel.ask_and_run()
     qtbot.waitUntil(lambda: not desk.work.running)
     assert desk.work.made() == 4 and not desk.work.problem
-    assert desk.panel.told.text() == "4 images of 2 scenes; 4 are there"
+    assert desk.panel.told.text() == "4 images of 2 scenes; 4 are there; a higher number of scenes makes more"
+    assert not desk.panel.foot.run.isEnabled() and "Every image is there" in desk.panel.foot.run.toolTip()
     desk.panel.scenes.setValue(3)
-    assert desk.panel.foot.run.text() == "Go on"
+    assert desk.panel.foot.run.text() == "Go on" and desk.panel.foot.run.isEnabled()
     desk.panel.ask_and_run()
     qtbot.waitUntil(lambda: not desk.work.running)
     assert desk.work.made() == 6
