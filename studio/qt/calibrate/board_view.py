@@ -10,7 +10,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
-    QComboBox,
     QHBoxLayout,
     QLabel,
     QStackedLayout,
@@ -36,6 +35,7 @@ from studio.qt.calibrate.calibration_work import CalibrationWork
 from studio.qt.calibrate.depth_plot import DepthPlot
 from studio.qt.calibrate.ghost import Ghost
 from studio.qt.core import theme
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import flush, text_button
@@ -69,7 +69,7 @@ class BoardView(QWidget):
         self.tabs.setDrawBase(False)
         for title, tip in TABS:
             self.tabs.setTabToolTip(self.tabs.addTab(title), tip)
-        self.laser = QComboBox()
+        self.laser = ChoiceBox()
         self.laser.setToolTip("Whose depth error is shown")
         self.view, self.plot = PictureView(), DepthPlot()
         self.items = BoardItems(self.view.box)

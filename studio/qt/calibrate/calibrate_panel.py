@@ -8,7 +8,6 @@ from pathlib import Path
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
-    QComboBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
@@ -24,6 +23,7 @@ from studio.project.calibration import Calibration
 from studio.qt.calibrate.calibration_work import BOARD, CalibrationWork
 from studio.qt.calibrate.keeping import FORMS, save, use, use_file
 from studio.qt.calibrate.view_table import ViewTable
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.jobs import JobRunner, time_left
 from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import ElidedLabel, text_button, thin_bar
@@ -72,7 +72,7 @@ class CalibratePanel(QWidget):
             "<p>Kind, counts and side: checkerboard:13x9:25mm counts the corners where four squares meet; "
             "charuco:14x10:25mm:18mm counts squares and has markers of 18 mm</p>"
         )
-        self.what, self.lens, self.carried = QComboBox(), QComboBox(), QComboBox()
+        self.what, self.lens, self.carried = ChoiceBox(), ChoiceBox(), ChoiceBox()
         for text, part in PARTS:
             self.what.addItem(text, part)
         for text, terms in LENSES:

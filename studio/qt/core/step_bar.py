@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QHBoxLayout, QSlider, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
+from studio.qt.core.boxes import Slider
 from studio.qt.core.icons import icon, icon_button
 from studio.qt.core.session import Session
 
@@ -18,7 +19,7 @@ class StepBar(QWidget):
         super().__init__(parent)
         self.session = session
         look = session.look_at_step
-        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider = Slider(Qt.Orientation.Horizontal)
         self.slider.setMaximum(0)
         self.slider.valueChanged.connect(look)
         self.play = icon_button("play", "Play the motion", self.toggle_play)

@@ -13,6 +13,7 @@ from studio.dataset.recipe import Draw
 from studio.editing.forms import PLAIN
 from studio.editing.units import Unit
 from studio.project.project import Project
+from studio.qt.core.boxes import StillBox
 from studio.qt.core.widgets import ElidedLabel
 from studio.qt.forms.unit_box import UnitBox
 
@@ -25,6 +26,10 @@ MOST_SAID = 30
 """Of the values of a choice."""
 ROOM = 0.5
 """How far beyond the file's range the slider reaches on either side, in parts of it."""
+
+
+class RangeSlider(StillBox, QRangeSlider):  # type: ignore[misc]
+    """Two ends on one line."""
 
 
 class DrawRow(QWidget):
@@ -54,7 +59,7 @@ class DrawRow(QWidget):
         self.logarithmic = draw.kind == "logarithmic"
         low, high = self._scaled(draw.low), self._scaled(draw.high)
         self.least, self.most = low - ROOM * (high - low), high + ROOM * (high - low)
-        self.slider = QRangeSlider(Qt.Orientation.Horizontal)  # type: ignore[no-untyped-call]
+        self.slider = RangeSlider(Qt.Orientation.Horizontal)
         self.slider.setRange(0, STEPS)
         self.slider.setAccessibleName(f"Range of {self.name.text()}")
         self.boxes = (self._box(draw.low), self._box(draw.high))

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QMenu,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
@@ -20,6 +19,7 @@ from studio.dataset.field_names import field_name
 from studio.dataset.images import images_of
 from studio.dataset.recipe import MOST_VARIANTS, ready_made
 from studio.editing.forms import PLAIN
+from studio.qt.core.boxes import WholeBox
 from studio.qt.core.folders import ask_results_folder
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.run_foot import RunFoot
@@ -49,11 +49,11 @@ class RecipePanel(QWidget):
         self.about = QLabel(wordWrap=True)
         self.about.setObjectName("muted")
         self.rows: list[DrawRow] = []
-        self.scenes = QSpinBox(minimum=1, maximum=10_000_000, value=self.work.scenes)
+        self.scenes = WholeBox(minimum=1, maximum=10_000_000, value=self.work.scenes)
         self.scenes.setToolTip("Each is rendered once")
-        self.images = QSpinBox(minimum=1, maximum=MOST_VARIANTS)
+        self.images = WholeBox(minimum=1, maximum=MOST_VARIANTS)
         self.images.setToolTip("Photographs of each scene: they share its light and draw the sensor anew")
-        self.seed = QSpinBox(minimum=0, maximum=2**31 - 1)
+        self.seed = WholeBox(minimum=0, maximum=2**31 - 1)
         self.seed.setToolTip("Decides every scene and every image")
         self.told = QLabel(wordWrap=True)
         self.foot = RunFoot("Where the images go; a dataset that is there goes on", "What is made stays")

@@ -20,14 +20,14 @@ from PySide6.QtGui import (
     QPaintEvent,
     QPalette,
     QPen,
-    QWheelEvent,
 )
-from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QLineEdit, QToolButton, QWidget
 
 from render.base.errors import InputError
 from studio.editing.forms import FieldSpec, choice_label
 from studio.editing.units import plain
 from studio.qt.core import theme
+from studio.qt.core.boxes import ChoiceBox
 
 
 class TextField(QLineEdit):
@@ -262,16 +262,15 @@ class FlagField(QCheckBox):
         self.setChecked(self._shown)
 
 
-class ChoiceField(QComboBox):
-    """One of a few values; the wheel scrolls the form instead of changing it."""
+class ChoiceField(ChoiceBox):
+    """One of a few values."""
 
     entered = Signal(object)
 
     def __init__(self, values: list[tuple[str, Any, str]], parent: QWidget | None = None) -> None:
         """values: label, value, help."""
         super().__init__(parent)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.setSizeAdjustPolicy(ChoiceBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(6)
         self.invalid = False
         self.values: list[Any] = []
@@ -313,9 +312,6 @@ class ChoiceField(QComboBox):
         super().paintEvent(event)
         if self.invalid:
             outline(self)
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        event.ignore()
 
 
 def outline(field: QWidget) -> None:

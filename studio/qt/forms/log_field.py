@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSlider, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from studio.editing.units import Unit
+from studio.qt.core.boxes import Slider
 from studio.qt.forms.unit_box import UnitBox
 
 STEPS = 1000
@@ -26,7 +27,7 @@ class LogField(QWidget):
     def __init__(self, low: float, high: float, factor: float, unit: str, decimals: int = 3) -> None:
         super().__init__()
         self.low, self.high, self.factor = low, high, factor
-        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider = Slider(Qt.Orientation.Horizontal)
         self.slider.setMaximum(STEPS)
         self.slider.setMinimumWidth(60)
         self.box = UnitBox(Unit.named(unit), 0.0, high * factor, decimals)

@@ -14,7 +14,6 @@ from PySide6.QtGui import (
     QPaintEvent,
     QPalette,
     QResizeEvent,
-    QWheelEvent,
 )
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QWidget
 
@@ -171,9 +170,6 @@ class NumberField(TextField):
             self.selectAll()
             return
         super().keyPressEvent(event)
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        event.ignore()  # the form scrolls; a number must not change on the way
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)

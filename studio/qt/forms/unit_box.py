@@ -6,14 +6,14 @@ from typing import Any
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QPaintEvent, QValidator
-from PySide6.QtWidgets import QDoubleSpinBox
 
 from render.base.errors import InputError
 from studio.editing.units import Unit
+from studio.qt.core.boxes import DecimalBox
 from studio.qt.forms.fields import outline, reason
 
 
-class UnitBox(QDoubleSpinBox):
+class UnitBox(DecimalBox):
     """Its value is in the unit that is shown; other units and sums are taken as in `NumberField`.
 
     A value is entered by Return or by leaving; what will not do is outlined, and told by `refused`.

@@ -7,7 +7,6 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
-    QComboBox,
     QFrame,
     QHBoxLayout,
     QLabel,
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
 from render.base.threads import Cancel
 from render.output.tone_mapping import Picture, pyramid
 from studio.qt.core import theme
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render, Session
@@ -59,8 +59,8 @@ class CameraView(QWidget):
         self.overlay = LineOverlay(self.view.box)
         self.marks = ScanLineMarks(session, self.view)
         self.profile = RowProfile(session)
-        self.choice = QComboBox()
-        self.choice.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
+        self.choice = ChoiceBox()
+        self.choice.setSizeAdjustPolicy(ChoiceBox.SizeAdjustPolicy.AdjustToContents)
         self.bright = QCheckBox("Brighten")
         self.bright.setChecked(True)
         self.saturated = QCheckBox(SATURATED_NAME)

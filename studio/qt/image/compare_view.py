@@ -6,13 +6,14 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, QSize, Qt
 from PySide6.QtGui import QCloseEvent, QImage, QPixmap, QShortcut
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
 
 from analysis.report.colour import DIVERGING
 from render.base.threads import Cancel
 from render.output.tone_mapping import Picture, colour_table, pyramid
 from studio.editing.units import Unit
 from studio.qt.core import theme
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Render
 from studio.qt.image.image_item import PictureItem, PictureView
@@ -46,9 +47,9 @@ class CompareView(QWidget):
         self.wipe = pg.InfiniteLine(angle=90, movable=True)
         self.wipe.setZValue(20)
         self.view.box.addItem(self.wipe, ignoreBounds=True)
-        self.mode = QComboBox()
+        self.mode = ChoiceBox()
         self.mode.addItems([WIPE, DIFFERENCE])
-        self.quantity = QComboBox()
+        self.quantity = ChoiceBox()
         self.left, self.right, self.told = QLabel(), QLabel(), QLabel()
         self.told.setObjectName("muted")
         self.scale = QLabel()

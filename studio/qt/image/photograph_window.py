@@ -12,7 +12,6 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QKeyEvent
 from PySide6.QtWidgets import (
     QCheckBox,
-    QComboBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
@@ -34,6 +33,7 @@ from studio.photographs.measured_set import MeasuredSet, measured_set
 from studio.photographs.photograph_set import Wishes
 from studio.photographs.region import Region, region_of
 from studio.qt.core import theme
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
@@ -68,7 +68,7 @@ class PhotographWindow(QWidget):
         self.found: MeasuredSet | None = None
         self._fitted = False
         self.names = QListWidget()
-        self.colour, self.axis = QComboBox(), QComboBox()
+        self.colour, self.axis = ChoiceBox(), ChoiceBox()
         self.colour.addItems(CHOICES["colour"])
         self.axis.addItems(CHOICES["axis"])
         self.colour.setToolTip("Of the laser; auto: by the evidence of the whole set")

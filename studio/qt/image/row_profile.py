@@ -8,7 +8,7 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QSpinBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from analysis.line.methods.line_profile import profile
 from analysis.line.result import Flag, Line
@@ -17,6 +17,7 @@ from render.base.arrays import Float
 from render.frame import LaserCurve
 from render.sensor.develop import Image
 from studio.qt.core import theme
+from studio.qt.core.boxes import WholeBox
 from studio.qt.core.session import Session
 from studio.scan.stages import Measurement
 
@@ -82,7 +83,7 @@ class RowProfile(QWidget):
         self.plot.addItem(self.pixels)
         self._marks: list[Any] = []
         self._top = 0.0
-        self.row = QSpinBox(maximum=0)
+        self.row = WholeBox(maximum=0)
         self.row.setKeyboardTracking(False)
         self.row.setPrefix("row ")
         self.follow = QCheckBox("follow the line")

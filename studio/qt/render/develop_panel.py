@@ -13,7 +13,6 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QCloseEvent
 from PySide6.QtWidgets import (
     QCheckBox,
-    QComboBox,
     QFormLayout,
     QLabel,
     QMenu,
@@ -31,6 +30,7 @@ from render.sensor.develop import Image
 from studio.preview.inspection import view_warnings
 from studio.preview.remedies import FILLED
 from studio.project.document import FieldPath
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Render, Session, one_of
@@ -81,13 +81,13 @@ class DevelopPanel(QWidget):
         )
         self.automatic_gain = QCheckBox("full well fills the range")
         self.gain = LogField(1e-3, 100.0, 1.0, "DN/e-", 4)
-        self.bits = QComboBox()
+        self.bits = ChoiceBox()
         for bits in (8, 10, 12, 16):
             self.bits.addItem(f"{bits} bit", bits)
         self.noise = QCheckBox("shot, dark, read, pixels")
         self.noise.setChecked(True)
         self.noise.setToolTip("Off: the mean image, still saturated and quantised. A look only, the project keeps it.")
-        self.exposures = QComboBox()
+        self.exposures = ChoiceBox()
         for count in range(1, 9):
             self.exposures.addItem("one" if count == 1 else f"{count}, fused", count)
         self.exposures.setToolTip("Several are fused in electrons, each shorter than the one before by the ratio")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
-    QComboBox,
     QHBoxLayout,
     QLabel,
     QPushButton,
@@ -26,6 +25,7 @@ from render.scene.motion import LinearStage, NoMotion, Turntable
 from studio.editing.scene_edits import set_motion
 from studio.project.document import Document
 from studio.project.project import Project
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.folders import ask_results_folder, may_replace_scan, unused_name
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner
 from studio.qt.core.open_file import open_file
@@ -77,7 +77,7 @@ class MotionPanel(QWidget):
         self.steps = StepBar(session)
         self.told = QLabel()
         self.told.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.scale = QComboBox()
+        self.scale = ChoiceBox()
         self.scale.addItems(list(SCALES))
         self.scale.setCurrentIndex(1)
         self.scale.setToolTip("Size of the rendered images: half size takes about a quarter of the time")

@@ -8,13 +8,10 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QCloseEvent, QShowEvent
 from PySide6.QtWidgets import (
-    QComboBox,
-    QDoubleSpinBox,
     QFormLayout,
     QHBoxLayout,
     QLabel,
     QSizePolicy,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
@@ -26,6 +23,7 @@ from render.run import Memory, Run
 from render.world.world import World
 from studio.editing.forms import choice_label
 from studio.project.project import Project
+from studio.qt.core.boxes import ChoiceBox, DecimalBox, WholeBox
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
 from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import bring_into_view, text_button, thin_bar
@@ -68,38 +66,38 @@ class RenderPanel(QWidget):
         self._state = RenderState({})
         self.plan = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
         self.plan.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.laser_error = QDoubleSpinBox(decimals=2, minimum=0.01, maximum=100.0)
+        self.laser_error = DecimalBox(decimals=2, minimum=0.01, maximum=100.0)
         self.laser_error.setSuffix(" %")
-        self.laser_error.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
+        self.laser_error.setStepType(DecimalBox.StepType.AdaptiveDecimalStepType)
         self.laser_error.setToolTip("Relative RMS error of the laser light over the lit pixels.")
-        self.samples = QSpinBox(minimum=1, maximum=65536)
-        self.samples.setStepType(QSpinBox.StepType.AdaptiveDecimalStepType)
+        self.samples = WholeBox(minimum=1, maximum=65536)
+        self.samples.setStepType(WholeBox.StepType.AdaptiveDecimalStepType)
         self.samples.setToolTip(
             "The ambient light ends here where its error is not reached. Samples of a pixel, on average: noisy places "
             "get more; four times as many halve the noise."
         )
-        self.ambient_error = QDoubleSpinBox(decimals=2, minimum=0.01, maximum=100.0)
+        self.ambient_error = DecimalBox(decimals=2, minimum=0.01, maximum=100.0)
         self.ambient_error.setSuffix(" %")
-        self.ambient_error.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
+        self.ambient_error.setStepType(DecimalBox.StepType.AdaptiveDecimalStepType)
         self.ambient_error.setToolTip("Relative RMS error of the ambient light at which it ends.")
-        self.goal = QDoubleSpinBox(decimals=2, minimum=0.0, maximum=10.0, singleStep=0.05)
+        self.goal = DecimalBox(decimals=2, minimum=0.0, maximum=10.0, singleStep=0.05)
         self.goal.setSuffix(" sigma")
         self.goal.setSpecialValueText("errors of the image")
         self.goal.setToolTip("What the render's own noise may add to the line, over its sigma by the sensor's noise.")
-        self.limit = QSpinBox(minimum=0, maximum=86400)
+        self.limit = WholeBox(minimum=0, maximum=86400)
         self.limit.setSuffix(" s")
         self.limit.setSpecialValueText("none")
         self.limit.setToolTip("The best frame so far is kept when the time is over.")
         for box in (self.laser_error, self.ambient_error, self.samples, self.goal, self.limit):
             box.setKeyboardTracking(False)
-        self.transport = QComboBox()
+        self.transport = ChoiceBox()
         for i, (value, text) in enumerate(TRANSPORT.items()):
             self.transport.addItem(choice_label(value), value)
             self.transport.setItemData(i, text, Qt.ItemDataRole.ToolTipRole)
         self.transport.setToolTip(
             "How far the light of the lasers is followed. Auto: a pilot decides; else the last step that is computed."
         )
-        self.scale = QComboBox()
+        self.scale = ChoiceBox()
         self.start_button = text_button("Render", name="primary")
         self.continue_button = text_button(
             "Continue", "Go on with the shown render, which was stopped before it reached its errors"

@@ -11,7 +11,6 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QHideEvent, QImage, QPixmap, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
-    QComboBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
@@ -28,6 +27,7 @@ from render.scene.shape import Unit
 from studio.commands.deviation import asked, details, sentence
 from studio.editing.units import Unit as ShownUnit
 from studio.project.step_file import is_step
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, ShownDeviation
@@ -68,16 +68,16 @@ class DeviationTab(QWidget):
         self._given_part: str | None = None
         self._given_limits: tuple[float | None, float | None] = None, None
         """As the project's report had them last."""
-        self.part = QComboBox()
+        self.part = ChoiceBox()
         self.nominal = ElidedLabel(Qt.TextElideMode.ElideLeft)
         self.choose = text_button("File…", "A CAD file in the part's place: STEP, STL, PLY, OBJ, GLB")
-        self.unit = QComboBox()
+        self.unit = ChoiceBox()
         self.unit.addItem("unit of the part", None)
         for unit in get_args(Unit):
             self.unit.addItem("µm" if unit == "um" else unit, unit)
         self.unit.setToolTip("That the nominal's file is in, which a mesh does not say")
         self.as_scanned = text_button("As scanned", "The part of the scene itself is the nominal")
-        self.alignment = QComboBox()
+        self.alignment = ChoiceBox()
         for key, name in ALIGNMENTS.items():
             self.alignment.addItem(name, key)
         self.spots = QLineEdit()

@@ -9,7 +9,6 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QComboBox,
     QHBoxLayout,
     QHeaderView,
     QLabel,
@@ -26,6 +25,7 @@ from analysis.gauges.read import Reading
 from analysis.report.gauge_table import DEFINITIONS, MARKS, beside_nominal, counts_text, small_text, value_text
 from analysis.report.units import NONE
 from studio.project.project import ProfileSection
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import keep_room, text_button
@@ -82,7 +82,7 @@ class PartTab(QWidget):
         self.add: QPushButton = text_button("Add", "Read another dimension off the profile")
         self.remove = text_button("Delete", "The chosen measure (Del in the table)")
         self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # by Tab it would get a space meant for the table
-        self.section = QComboBox()
+        self.section = ChoiceBox()
         for value, title in SECTIONS.items():
             self.section.addItem(title, value)
         self.section.setToolTip(SECTION_TIP)

@@ -7,7 +7,6 @@ from functools import partial
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
-    QComboBox,
     QFrame,
     QGridLayout,
     QLabel,
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
 from studio.preview.readout_rows import Row, rows
 from studio.preview.readouts import readouts
 from studio.qt.core import theme
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import ElidedLabel
@@ -41,7 +41,7 @@ class ReadoutPanel(QWidget):
         self._session, self._live = session, live(session)
         self.laser = 0
         """Index of the laser that is read out."""
-        self._lasers = QComboBox()
+        self._lasers = ChoiceBox()
         self._lasers.setToolTip("The laser that the read-outs are of")
         self._lasers.activated.connect(self._choose)
         self._hint = QLabel("Add a laser to the rig to see what it measures.", wordWrap=True)

@@ -11,7 +11,6 @@ from html import escape
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QResizeEvent
 from PySide6.QtWidgets import (
-    QComboBox,
     QFrame,
     QHBoxLayout,
     QLabel,
@@ -27,6 +26,7 @@ from PySide6.QtWidgets import (
 
 from analysis.report.colour import TRUTH, method_colour, method_name
 from studio.qt.core import theme
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.icons import dot
 from studio.qt.core.scan_steps import scan_steps
@@ -74,8 +74,8 @@ class ResultsPanel(QWidget):
         self.scan_lines: tuple[str, int, int] | None = None
         self.hidden: set[str] = set()
         """Methods that are switched off."""
-        self.laser = QComboBox()
-        self.error = QComboBox()
+        self.laser = ChoiceBox()
+        self.error = ChoiceBox()
         self.error.addItems([view.title for view in ERROR_VIEWS])
         self.error.setToolTip(
             "Which error plots, histogram and table show: measured minus true; of depth and surface positive is too "

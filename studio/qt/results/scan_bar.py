@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.open_file import open_file
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
@@ -24,7 +25,7 @@ class ScanBar(QWidget):
         self.scan: ScanResults | None = None
         self.steps.setMinimumWidth(260)
         self.told = QLabel()
-        self.scope = QComboBox()
+        self.scope = ChoiceBox()
         self.scope.addItems(["Figures of all steps", "Figures of this step"])
         self.scope.setToolTip("What the measures, the histogram and the points in the 3D view are of")
         self.scope.currentIndexChanged.connect(self._rescope)

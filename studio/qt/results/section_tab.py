@@ -15,7 +15,6 @@ from PySide6.QtGui import QHideEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
     QCheckBox,
-    QComboBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
@@ -34,6 +33,7 @@ from render.base.errors import InputError
 from render.world.world import build_world
 from studio.editing.units import Unit
 from studio.qt.core import theme
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.dialogs import beside_project, show_trouble
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, ShownSection
@@ -63,7 +63,7 @@ class SectionTab(QWidget):
         self.session, self.runner = session, runner
         self.section: Section | None = None
         self._read: World | None = None
-        self.normal = QComboBox()
+        self.normal = ChoiceBox()
         for name, normal in NORMALS.items():
             self.normal.addItem(name, normal)
         self.normal.addItem("by its normal", None)

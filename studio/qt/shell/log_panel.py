@@ -7,7 +7,6 @@ import html
 
 from PySide6.QtWidgets import (
     QApplication,
-    QComboBox,
     QHBoxLayout,
     QPlainTextEdit,
     QToolButton,
@@ -16,6 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from studio.qt.core import theme
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.session import Session
 
 KEPT = 2000
@@ -32,7 +32,7 @@ class LogPanel(QWidget):
         self.text = QPlainTextEdit(readOnly=True)
         self.text.setMaximumBlockCount(KEPT)
         self.text.setPlaceholderText("Nothing has happened yet.")
-        self.level = QComboBox()
+        self.level = ChoiceBox()
         self.level.addItems(list(SHOWN))
         self.level.currentTextChanged.connect(lambda _: self._show_all())
         copy = QToolButton()

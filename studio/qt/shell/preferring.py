@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING, Any, cast
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import (
     QCheckBox,
-    QComboBox,
     QDialog,
     QDialogButtonBox,
     QFormLayout,
     QLabel,
-    QSpinBox,
     QVBoxLayout,
 )
 
 from render.base.threads import thread_count, use_at_most
 from studio.editing.units import show_lengths_in
 from studio.project.document import Document
+from studio.qt.core.boxes import ChoiceBox, WholeBox
 from studio.runtime.preferences import Preferences
 
 if TYPE_CHECKING:
@@ -135,15 +134,15 @@ class PreferencesDialog(QDialog):
         }
 
 
-def _choice(names: dict[str, str]) -> QComboBox:
-    box = QComboBox()
+def _choice(names: dict[str, str]) -> ChoiceBox:
+    box = ChoiceBox()
     for key, name in names.items():
         box.addItem(name, key)
     return box
 
 
-def _number(low: int, high: int, suffix: str) -> QSpinBox:
-    box = QSpinBox()
+def _number(low: int, high: int, suffix: str) -> WholeBox:
+    box = WholeBox()
     box.setRange(low, high)
     box.setSuffix(suffix)
     return box

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QMenu,
     QPushButton,
     QSizePolicy,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
@@ -22,6 +21,7 @@ from render.base.errors import InputError
 from studio.editing.forms import FieldSpec, choice_label
 from studio.project.document import FieldPath, value_at
 from studio.project.project import Project
+from studio.qt.core.boxes import WholeBox
 from studio.qt.core.icons import icon_button
 from studio.qt.forms.fields import ChoiceField, TextField
 from studio.qt.forms.number_field import NumberField
@@ -176,7 +176,7 @@ class ParameterRow(QWidget):
             line.addWidget(unit)
             return line
         self.low, self.high = (self._end(name) for name in ("low", "high"))
-        self.count = QSpinBox(minimum=2, maximum=MOST_VALUES)
+        self.count = WholeBox(minimum=2, maximum=MOST_VALUES)
         self.count.setToolTip("How many values, both ends among them")
         self.count.setKeyboardTracking(False)
         self.count.valueChanged.connect(lambda count: self._change(count=count))

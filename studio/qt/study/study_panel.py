@@ -8,8 +8,6 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import (
-    QComboBox,
-    QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
@@ -17,11 +15,11 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QMenu,
     QSizePolicy,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
 
+from studio.qt.core.boxes import ChoiceBox, DecimalBox, WholeBox
 from studio.qt.core.folders import ask_results_folder
 from studio.qt.core.icons import icon_button
 from studio.qt.core.jobs import JobRunner, duration
@@ -53,20 +51,20 @@ class StudyPanel(QWidget):
         menu = QMenu(self.files)
         menu.aboutToShow.connect(partial(self._fill_files, menu))
         self.files.setMenu(menu)
-        self.base = QComboBox()
+        self.base = ChoiceBox()
         self.base.setToolTip("The project that every cell is a variation of")
-        self.sweeps = QComboBox()
+        self.sweeps = ChoiceBox()
         self.sweeps.setToolTip("A study has one chart for each sweep; type to give this one another name")
         self.sweeps.setEditable(True)
-        self.sweeps.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
+        self.sweeps.setInsertPolicy(ChoiceBox.InsertPolicy.NoInsert)
         for box in (self.base, self.sweeps):
             box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.add_sweep = icon_button("new", "Another sweep", self._add_sweep)
         self.remove_sweep = icon_button("cancel", "Remove this sweep", self._remove_sweep)
         self.editor = SweepEditor(self.work)
-        self.repeats = QSpinBox(minimum=1, maximum=10_000)
+        self.repeats = WholeBox(minimum=1, maximum=10_000)
         self.repeats.setToolTip("Of every cell, each with a seed of its own: intervals come from them")
-        self.scale = QDoubleSpinBox(minimum=0.01, maximum=4.0, decimals=3, singleStep=0.05)
+        self.scale = DecimalBox(minimum=0.01, maximum=4.0, decimals=3, singleStep=0.05)
         self.scale.setToolTip("So many times the pixels a side; figures are the scanner's at 1 alone")
         self.repeats.setKeyboardTracking(False)
         self.scale.setKeyboardTracking(False)

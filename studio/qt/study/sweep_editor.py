@@ -11,13 +11,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDoubleSpinBox,
     QFormLayout,
     QHBoxLayout,
     QLabel,
     QMenu,
     QSizePolicy,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
@@ -26,6 +24,7 @@ from analysis.line.settings import Method
 from analysis.report.colour import method_colour, method_name
 from studio.editing.forms import FieldSpec
 from studio.editing.units import Unit
+from studio.qt.core.boxes import DecimalBox, WholeBox
 from studio.qt.core.widgets import text_button
 from studio.qt.forms.fields import ChoiceField
 from studio.qt.forms.number_field import NumberField
@@ -85,8 +84,8 @@ class SweepEditor(QWidget):
         menu.aboutToShow.connect(lambda: fill_field_menu(menu, work.session, work.project()))
         self.add.setMenu(menu)
         self.sampling, self.chart = ChoiceField(SAMPLINGS), ChoiceField(CHARTS)
-        self.samples = QSpinBox(minimum=2, maximum=65536)
-        self.tolerance = QDoubleSpinBox(minimum=0.01, maximum=50.0, decimals=2, suffix=" %")
+        self.samples = WholeBox(minimum=2, maximum=65536)
+        self.tolerance = DecimalBox(minimum=0.01, maximum=50.0, decimals=2, suffix=" %")
         self.samples.setKeyboardTracking(False)
         self.tolerance.setKeyboardTracking(False)
         self.tolerance.setToolTip("Of the range: the search ends in a bracket of this width, or where noise decides")
