@@ -160,6 +160,8 @@ class Session(QObject):
     """`range` is another."""
     range_dragged = Signal(float, float)
     """From and to: scan lines that were dragged over in the picture, for results to tell of."""
+    pixel_clicked = Signal(float, float, bool)
+    """Column and row of the camera's image that were clicked in its picture, and whether that is of the scene now."""
     step_changed = Signal()
     """`step`, the step of the motion that is looked at, is another one."""
     renders_changed = Signal()
@@ -193,8 +195,8 @@ class Session(QObject):
         self.selection: FieldPath = ()
         """The item that panels show, and about which several are turned."""
         self._others: tuple[FieldPath, ...] = ()
-        self._judged: tuple[Render, Project, bool] | None = None
         """Items that are selected beside it."""
+        self._judged: tuple[Render, Project, bool] | None = None
         self.hovered: int | None = None
         self.range: tuple[float, float] | None = None
         """From and to: the scan lines that the results tell of; None: all, or no range of them."""

@@ -27,6 +27,7 @@ from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import flush, upper_and_lower
 from studio.qt.image.image_item import PictureView
 from studio.qt.image.line_overlay import BOX_PX, LineOverlay, swatch
+from studio.qt.image.picture_clicks import PictureClicks
 from studio.qt.image.row_profile import RowProfile
 from studio.qt.image.scan_line_marks import ScanLineMarks
 from studio.runtime.jobs import Progress
@@ -58,6 +59,7 @@ class CameraView(QWidget):
         self.view = PictureView()
         self.overlay = LineOverlay(self.view.box)
         self.marks = ScanLineMarks(session, self.view)
+        PictureClicks(session, self.view, lambda: self.is_live or not session.stale)
         self.profile = RowProfile(session)
         self.choice = ChoiceBox()
         self.choice.setSizeAdjustPolicy(ChoiceBox.SizeAdjustPolicy.AdjustToContents)

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
 
 
 def escape(window: MainWindow) -> None:
-    """End the tour, or a measure that is being added; a job goes on, and it is said how to stop it."""
+    """End what waits for a click, the tour, or a measure that is being added; of a job it is said how to stop it."""
+    if window.panels.is_made("viewport") and cast(Any, window.panels["viewport"]).give_up():
+        return
     if window.tour is not None:
         window.tour.end()
     elif window.panels.is_made("results") and cast(Any, window.panels["results"]).give_up():

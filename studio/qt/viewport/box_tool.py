@@ -54,7 +54,7 @@ class BoxTool(ViewMode):
 
     def cancel(self) -> None:
         self.view.let_go()
-        self.end()
+        super().cancel()
 
     def hover(self, x: float, y: float) -> bool:
         return False

@@ -39,6 +39,10 @@ class ViewMode(QObject):
         """Leave it, if it is on, with what has been done so far."""
         raise NotImplementedError
 
+    def cancel(self) -> None:
+        """Leave it, as it was before where it has changed something."""
+        self.end()
+
     def type(self, event: QKeyEvent) -> bool:
         """Whether it takes the key."""
         raise NotImplementedError

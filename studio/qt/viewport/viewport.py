@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 from PySide6.QtCore import QPoint, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtGui import QCloseEvent, QHideEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import QApplication, QToolTip, QVBoxLayout, QWidget
 from vtkmodules.vtkRenderingCore import vtkActor, vtkCellPicker
 
@@ -120,13 +120,39 @@ class Viewport(QWidget):
             on = False
         on = on and not self.session.dragging
         self.bar.aim.setChecked(on)
-        self.bar.tell("click what the laser is to light" if on else "")
+        self.bar.tell("click what the laser is to light, here or in the camera view; Esc: back" if on else "")
         self.view.tool = None if on else self._tools  # its handles may lie over what is to be lit
         self.view.setCursor(Qt.CursorShape.CrossCursor if on else Qt.CursorShape.ArrowCursor)
 
     def aim_at(self, x: float, y: float) -> None:
         """Turn the laser to the surface under a point of the view; one step to undo."""
-        origin, direction = self.view.eye.ray(x, y, self.view.pixels)
+        self._aim_along(*self.view.eye.ray(x, y, self.view.pixels))
+
+    def aim_at_pixel(self, column: float, row: float, current: bool) -> None:
+        """The same by a pixel of the camera, while a laser is being aimed. current: as `Session.pixel_clicked`."""
+        if not self.bar.aim.isChecked():
+            return
+        if not current:
+            message = "that picture is of the scene before it was changed; choose the live estimate, and click there"
+            self.session.message.emit("error", message)
+            return
+        scene = self.live.look.scene
+        directions, valid = scene.camera.rays(np.array([[column, row]]))
+        T_world_camera = scene.T_world_camera(self.live.step)
+        if valid[0]:
+            self._aim_along(T_world_camera[:3, 3], T_world_camera[:3, :3] @ directions[0])
+
+    def give_up(self) -> bool:
+        """Escape: what the next click or key would do is not done; False: nothing was waiting for one."""
+        if self.bar.aim.isChecked():
+            self.begin_aim(False)
+            return True
+        waiting = next((mode for mode in (self.typed, self.snap, self.box) if mode.active), None)
+        if waiting is not None:
+            waiting.cancel()
+        return waiting is not None
+
+    def _aim_along(self, origin: Float, direction: Float) -> None:
         distance = self._mesh_hit(origin, direction)[1]
         if not math.isfinite(distance):
             self.session.message.emit("error", "no surface is there; click on an object to aim the laser at it")
@@ -172,6 +198,10 @@ class Viewport(QWidget):
         self.scene.show(what, on)
         self.view.redraw()
 
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self.give_up()  # in another workspace the next click means something else
+
     def closeEvent(self, event: QCloseEvent) -> None:
         self._hover.stop()
         self.live.close()
@@ -184,6 +214,7 @@ class Viewport(QWidget):
         self.live.loading.connect(self.bar.tell_loading)
         session.selection_changed.connect(self._highlight)
         session.document_replaced.connect(self._start_anew)
+        session.pixel_clicked.connect(self.aim_at_pixel)
         session.frame_requested.connect(lambda: self.frame(session.selection))
         theme.notice.changed.connect(self._paint)
         view.clicked.connect(self._clicked)
