@@ -292,9 +292,10 @@ def working_range(camera: Camera, T_camera_laser: Float) -> tuple[float | None, 
         seen &= np.abs(pixels[:, 1] - (camera.height - 1) / 2) <= camera.height / 2
     if not seen.any():
         return None, None
-    inside = np.flatnonzero(seen)
-    farthest = None if inside[-1] == len(points) - 1 else float(points[inside[-1], 2])
-    return float(points[inside[0], 2]), farthest
+    if seen[-1]:
+        return float(points[seen, 2].min()), None
+    # a laser that is turned back towards the camera comes nearer along its axis
+    return float(points[seen, 2].min()), float(points[seen, 2].max())
 
 
 def _warnings(project: Project, views: tuple[LaserView, ...], laser_power: Sequence[float] | None = None) -> list[str]:

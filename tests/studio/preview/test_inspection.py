@@ -15,7 +15,7 @@ from render.scene.lights import Environment
 from render.scene.scene import SceneObject
 from render.scene.shape import Plane
 from studio.photographs.image_files import load_photograph
-from studio.preview.inspection import Inspection, inspect
+from studio.preview.inspection import Inspection, inspect, working_range
 from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.scan.options import ScanOptions
@@ -67,6 +67,22 @@ def test_working_range(found: Inspection) -> None:
     near = BASELINE / (2448 / 2 / FOCAL + math.tan(TILT))
     assert found.lasers[0].working_nearest == pytest.approx(near, rel=0.003)
     assert found.lasers[0].working_farthest is None
+
+
+def test_the_range_of_a_laser_that_points_back_towards_the_camera_begins_at_its_near_end(facing: Project) -> None:
+    """Its axis, x = B - t cos(back) and z = z0 - t sin(back), is in the image from x = W z / 2f to x = -W z / 2f."""
+    camera, back, z0 = facing.scene.camera, math.radians(5.0), 0.5
+    pose = np.eye(4)
+    pose[:3, 2] = -math.cos(back), 0.0, -math.sin(back)
+    pose[:3, 3] = BASELINE, 0.0, z0
+    nearest, farthest = working_range(camera, pose)
+    half = camera.width / 2 / camera.fx
+    begin, end = (
+        z0 - math.sin(back) * (BASELINE - side * half * z0) / (math.cos(back) - side * half * math.sin(back))
+        for side in (1, -1)
+    )
+    assert end < begin
+    assert (nearest, farthest) == (pytest.approx(end, rel=0.003), pytest.approx(begin, rel=0.003))
 
 
 def test_line_width(facing: Project, found: Inspection) -> None:
