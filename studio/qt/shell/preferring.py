@@ -23,6 +23,7 @@ from studio.runtime.preferences import Preferences
 if TYPE_CHECKING:
     from studio.qt.shell.window import MainWindow
 
+THEMES = {"system": "As the desktop", "dark": "Dark", "light": "Light"}
 LENGTHS = {"mm": "Millimetres", "um": "Micrometres", "cm": "Centimetres", "m": "Metres", "in": "Inches"}
 SCALES = {"full": (1.0, "Full"), "half": (0.5, "Half"), "quarter": (0.25, "A quarter"), "eighth": (0.125, "An eighth")}
 
@@ -54,6 +55,8 @@ class Preferring(QObject):
         before = self.window.preferences.values
         self.window.preferences.change(**chosen)
         self.take_on()
+        if chosen["theme"] != before.theme:
+            self.window.choose_theme(chosen["theme"])
         if chosen["image_scale"] != before.image_scale:
             self._take_scale()
         if chosen["length_unit"] != before.length_unit:
@@ -79,6 +82,7 @@ class PreferencesDialog(QDialog):
         self.setObjectName("preferences")
         self.setWindowTitle("Preferences")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.theme = _choice(THEMES)
         self.length = _choice(LENGTHS)
         self.threads = _number(0, max(thread_count(1024), 1), "")
         self.threads.setSpecialValueText("all processors")
@@ -90,6 +94,7 @@ class PreferencesDialog(QDialog):
         self.undo = _number(10, 10_000, " edits")
         form = QFormLayout()
         form.setLabelAlignment(Qt.AlignmentFlag.AlignRight)
+        form.addRow("Theme", self.theme)
         form.addRow("Lengths in", self.length)
         note = QLabel(
             "Of fields and design, from the next start; results stay in mm and µm.\nWhat is typed may have any unit."
@@ -114,6 +119,7 @@ class PreferencesDialog(QDialog):
 
     def show_values(self, values: Preferences) -> None:
         """In the rows; nothing is taken on before OK."""
+        self.theme.setCurrentIndex(self.theme.findData(values.theme))
         self.length.setCurrentIndex(self.length.findData(values.length_unit))
         self.threads.setValue(values.threads or 0)
         self.scale.setCurrentIndex(self.scale.findData(values.image_scale))
@@ -125,6 +131,7 @@ class PreferencesDialog(QDialog):
     def chosen(self) -> dict[str, Any]:
         """By the names of `Preferences`."""
         return {
+            "theme": self.theme.currentData(),
             "length_unit": self.length.currentData(),
             "threads": self.threads.value() or None,
             "image_scale": self.scale.currentData(),

@@ -11,6 +11,7 @@ from pytestqt.qtbot import QtBot
 from render.base.threads import thread_count, use_at_most
 from studio.editing import units
 from studio.project.document import HISTORY, Document
+from studio.qt.core import theme
 from studio.qt.shell.preferring import PreferencesDialog, take_units
 from studio.qt.shell.window import MainWindow
 from studio.runtime.preferences import Preferences, PreferencesFile
@@ -51,11 +52,23 @@ def test_what_is_chosen_is_remembered_and_felt(window: MainWindow, qtbot: QtBot)
     window.files.keep()
     assert not window.files.autosave.file.exists()
     window.preferring.change(
-        {**{name: getattr(Preferences(), name) for name in ("length_unit", "threads", "image_scale")},
+        {**{name: getattr(Preferences(), name) for name in ("theme", "length_unit", "threads", "image_scale")},
          "autosave": True, "autosave_every": 30.0, "undo_depth": HISTORY}
     )  # fmt: skip
     window.files.keep()
     assert window.files.autosave.file.exists()
+
+
+def test_the_theme_is_that_of_the_view_menu(window: MainWindow, qtbot: QtBot) -> None:
+    window.commands["theme_dark"].trigger()
+    dialog = window.preferring.ask()
+    assert dialog.theme.currentText() == "Dark"
+    dialog.theme.setCurrentIndex(dialog.theme.findData("light"))
+    assert theme.colours() == theme.DARK, "nothing is taken on before OK"
+    with qtbot.waitSignal(dialog.accepted):
+        dialog.accept()
+    assert theme.colours() == theme.LIGHT and window.commands["theme_light"].isChecked()
+    assert window.preferences.values.theme == "light"
 
 
 def test_cancel_changes_nothing_and_defaults_are_shown_first(window: MainWindow) -> None:
