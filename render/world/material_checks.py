@@ -13,7 +13,7 @@ from render.base.pose import invert, transform_points
 from render.laser.irradiance import SHEET_SIGMAS
 from render.laser.laser import LineLaser
 from render.material.material import Emitter
-from render.scene.scene import Scene
+from render.scene.scene import Scene, SceneObject
 from render.world.overlaps import MOST_BODIES, priority_of
 from render.world.world import World
 
@@ -138,13 +138,13 @@ def departure(world: World, scene: Scene, index: int, step: int = 0) -> Departur
 
 
 def _shading_warnings(world: World, scene: Scene, step: int) -> list[str]:
-    found = []
+    found, label = [], repr(SceneObject.model_fields["crease_angle"].title)
     for i, item in enumerate(scene.visible_objects):
         off = departure(world, scene, i, step)
         if off is not None and (off.pixels > VISIBLE_PX or off.angle > VISIBLE_ANGLE):
             found.append(
                 f"object {item.name!r}: smooth shading shows a surface that is not there, up to "
                 f"{math.degrees(off.angle):.1f} deg and {off.depth * 1e6:.3g} um ({off.pixels:.2g} px of the line) off "
-                "the facets that the truth is made of; use a finer mesh, or a smaller crease_angle"
+                f"the facets that the truth is made of; use a finer mesh, or a smaller {label} (crease_angle)"
             )
     return found

@@ -1,4 +1,4 @@
-"""A mesh where it belongs: another file in its place, its up axis, on the ground, as large as the camera sees."""
+"""A mesh where it belongs: its up axis, on the ground, as large as the camera sees."""
 
 from __future__ import annotations
 
@@ -10,20 +10,13 @@ import numpy as np
 from render.base.arrays import Float
 from render.base.pose import Pose, transform_points
 from render.scene.scene import Scene, SceneObject
-from render.scene.shape import MeshFile
 from studio.editing.placement import field_of_view, target, vector
 from studio.editing.placing import least_turn
-from studio.project.mesh_import import ImportedMesh
 
 UpAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 UP_AXES: tuple[UpAxis, ...] = get_args(UpAxis)
 FILLED = 0.8
 """Of the camera's view, by a part that was fitted to it."""
-
-
-def with_mesh(item: SceneObject, mesh: ImportedMesh) -> SceneObject:
-    """Another mesh, in its own unit; name, pose, scale and material stay."""
-    return item.model_copy(update={"shape": MeshFile(path=mesh.path, unit=mesh.unit)})
 
 
 def up_axis(item: SceneObject) -> UpAxis | None:

@@ -93,8 +93,7 @@ def add_mesh(
 
     bounds: lowest and highest corner of the mesh in m, where known; else its origin is put there.
     """
-    stem = path.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0] or "mesh"
-    name = unique_name(stem[:100], _names(project, OBJECTS))
+    name = unique_name(_stem(path), _names(project, OBJECTS))
     place = target(project.scene)
     if bounds is not None:
         place = place - [(low + high) / 2 for low, high in zip(*bounds, strict=True)]
@@ -114,9 +113,32 @@ def add_parts(project: Project, parts: Sequence[ImportedMesh]) -> Result:
         project, path = add_mesh(project, part.path, part.unit, part.bounds)
         name = unique_name(part.name or "part", _names(project, OBJECTS) - {value_at(project, path).name})
         material = Lambertian() if part.colour is None else Lambertian(albedo=part.colour)
-        changed = {"name": name, "material": material, "crease_angle": SMOOTH_BELOW}
+        changed = {"name": name, "material": material, "crease_angle": _smooth_below(part)}
         project = replaced(project, path, value_at(project, path).model_copy(update=changed))
     return project, path
+
+
+def replace_mesh_of(project: Project, path: FieldPath, mesh: ImportedMesh) -> Project:
+    """An object of another mesh, in its own unit and shaded as an import of it is; pose, scale and material stay.
+
+    A name that is that of the former file, as an import gives it, becomes that of the new one. KeyError: no object.
+    """
+    item = value_at(project, path)
+    of_file = isinstance(item.shape, MeshFile) and re.sub(r" \d+$", "", item.name) == _stem(item.shape.path)
+    changed = {"shape": MeshFile(path=mesh.path, unit=mesh.unit), "crease_angle": _smooth_below(mesh)}
+    project = replaced(project, path, item.model_copy(update=changed))
+    if not of_file:
+        return project
+    return rename(project, path, unique_name(mesh.name or _stem(mesh.path), _names(project, OBJECTS) - {item.name}))
+
+
+def _smooth_below(mesh: ImportedMesh) -> float:
+    """Facets of a STEP file stand for the curved surfaces that it has; those of a mesh may be all that there is."""
+    return 0.0 if mesh.closed is None else SMOOTH_BELOW
+
+
+def _stem(path: str) -> str:
+    return path.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0][:100] or "mesh"
 
 
 def add_light(project: Project, kind: type[PointLight] | type[RectangleLight]) -> Result:

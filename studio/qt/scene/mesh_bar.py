@@ -14,13 +14,17 @@ from render.base.errors import InputError
 from render.scene.scene import SceneObject
 from render.scene.shape import MeshFile
 from studio.editing import mesh_placing
-from studio.editing.scene_edits import OBJECTS
+from studio.editing.scene_edits import OBJECTS, replace_mesh_of
+from studio.editing.units import Unit
 from studio.project.document import FieldPath, replaced, value_at
 from studio.project.mesh_import import ImportedMesh
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import text_button
 from studio.qt.scene import mesh_importer
+
+REPLACES = "Another mesh file in its place, shaded as an import of it is; pose, scale and material stay"
+SCALES = "Changes its size: it is scaled until it fills the camera's view, and put in the middle of that"
 
 
 class MeshBar(QWidget):
@@ -29,9 +33,9 @@ class MeshBar(QWidget):
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.session = session
-        self.replace = text_button("Replace…", "Another mesh file in its place; pose, scale and material stay")
+        self.replace = text_button("Replace…", REPLACES)
         self.up = text_button("", "Which axis of the file points up", "choice")
-        self.fit = text_button("Fit to view", "Scale it to the camera's view, and put it in the middle of that")
+        self.fit = text_button("Scale to fit", SCALES)
         self.ground = text_button("On the ground", "Its lowest point at height zero")
         self.told = QLabel(wordWrap=True)
         self.told.setObjectName("muted")
@@ -90,8 +94,17 @@ class MeshBar(QWidget):
         self._place(f"{axis} up", turned)
 
     def _fit(self) -> None:
-        scene = self.session.project.scene
-        self._place("fit to view", lambda item, vertices: mesh_placing.fitted(item, vertices, scene))
+        """The size of a part is what is measured: that it is another one now is said."""
+        item, scene = selected_mesh(self.session), self.session.project.scene
+        vertices = None if item is None else self._vertices(item)
+        self._place("scale to fit", lambda item, vertices: mesh_placing.fitted(item, vertices, scene))
+        now = selected_mesh(self.session)
+        if item is None or now is None or vertices is None or now is item:
+            return
+        by, length = now.scale / item.scale, Unit.of("m")
+        before = float((vertices.max(axis=0) - vertices.min(axis=0)).max())
+        sizes = " became ".join(f"{length.factor * size:.4g} {length.shown}" for size in (before, by * before))
+        self.session.message.emit("info", f"{now.name} is scaled by {by:.3g}: {sizes}; Ctrl+Z takes it back")
 
     def _place(self, label: str, change: Callable[[SceneObject, Float], SceneObject]) -> None:
         item, session = selected_mesh(self.session), self.session
@@ -149,9 +162,8 @@ def replace_mesh(session: Session, parent: QWidget) -> None:
 def take_mesh(session: Session, path: FieldPath, mesh: ImportedMesh) -> None:
     """Make a mesh that was read the shape of an object, unless that is gone meanwhile."""
     try:
-        item = value_at(session.project, path)
+        project = replace_mesh_of(session.project, path, mesh)
     except KeyError:
         session.message.emit("error", "the object whose mesh was to be replaced is no longer there")
         return
-    label = f"use {Path(mesh.path).name}"
-    session.document.apply(label, replaced(session.project, path, mesh_placing.with_mesh(item, mesh)))
+    session.document.apply(f"use {Path(mesh.path).name}", project)

@@ -138,6 +138,7 @@ def test_shading_that_departs_from_the_facets_is_told_with_its_depth(tmp_path):
     diagonal = 0.05 * math.sqrt(2) * 2 * math.sin(math.pi / 16)
     assert coarse.depth == pytest.approx(diagonal**2 / (8 * 0.05), rel=0.1)
     assert len(told) == 1 and "object 'ball': smooth shading" in told[0] and "px of the line" in told[0]
+    assert "a smaller 'Smooth shading up to' (crease_angle)" in told[0], "as the window and as the file name it"
     fine, quiet = off(512)
     assert quiet == () and fine.depth == pytest.approx(coarse.depth / 1024, rel=0.1)
     assert fine.angle == pytest.approx(coarse.angle / 32, rel=0.1)

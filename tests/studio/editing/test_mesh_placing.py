@@ -1,4 +1,4 @@
-"""A mesh on the ground, with another axis up, fitted to the view, or of another file."""
+"""A mesh on the ground, with another axis up, or scaled to fit the view."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import pytest
 
 from render.base.arrays import Float
 from render.base.pose import Pose, transform_points
-from render.material.conductor import Conductor
 from render.scene.scene import SceneObject
 from render.scene.shape import MeshFile
 from studio.editing.mesh_placing import (
@@ -19,10 +18,8 @@ from studio.editing.mesh_placing import (
     on_ground,
     up_axis,
     with_axis_up,
-    with_mesh,
 )
 from studio.editing.placement import field_of_view, target
-from studio.project.mesh_import import ImportedMesh
 from studio.project.project import Project
 from studio.project.templates import template_folder
 
@@ -69,13 +66,6 @@ def test_a_fitted_part_fills_its_share_of_the_view_about_its_middle(vertices: Fl
     middle = (scaled.min(axis=0) + scaled.max(axis=0)) / 2.0
     assert in_world(item, middle[None])[0] == pytest.approx(target(scene), abs=2 * NANOMETRE)
     assert item.T_world_object.rotation == POSE.rotation
-
-
-def test_another_file_takes_the_place_of_the_mesh_alone() -> None:
-    item = ITEM.model_copy(update={"material": Conductor()})
-    other = with_mesh(item, ImportedMesh("meshes/new.ply", "in", ((0, 0, 0), (1, 1, 1)), 12))
-    assert (other.shape.path, other.shape.unit) == ("meshes/new.ply", "in")
-    assert other.model_copy(update={"shape": item.shape}) == item
 
 
 def test_boxes_that_share_space_are_told_and_what_touches_is_not() -> None:

@@ -13,6 +13,7 @@ import trimesh
 
 from render.base.errors import InputError
 from render.base.pose import invert
+from render.material.conductor import Conductor
 from render.mesh.trimesh_reader import side_files
 from render.scene.lights import PointLight, RectangleLight
 from render.scene.motion import LinearStage, NoMotion, PoseList, Turntable
@@ -23,7 +24,7 @@ from studio.editing import scene_edits
 from studio.editing.placement import field_of_view, target, working_distance
 from studio.editing.scene_edits import LASERS, LIGHTS, OBJECTS
 from studio.project.document import replaced, value_at
-from studio.project.mesh_import import copied_beside, import_mesh, needs_copy
+from studio.project.mesh_import import ImportedMesh, copied_beside, import_mesh, needs_copy
 from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, template_folder
 
@@ -172,6 +173,26 @@ class TestLists:
         assert scene_edits.rename(judged, (*OBJECTS, 1), "part").delivery.surface_of == "part"
         assert scene_edits.rename(judged, (*OBJECTS, 0), "part").delivery.surface_of == second
         assert scene_edits.rename(project, (*OBJECTS, 1), "part").delivery.surface_of == ""
+
+    def test_another_file_is_shaded_as_an_import_of_it_and_pose_scale_and_material_stay(self, project: Project) -> None:
+        box = (0.0, 0.0, 0.0), (0.1, 0.1, 0.1)
+        step = ImportedMesh("meshes/housing/lid.ply", "mm", box, 12, "lid", closed=True)
+        scan = ImportedMesh("meshes/bunny.stl", "in", box, 12)
+        imported, path = scene_edits.add_parts(project, [step])
+        item = value_at(imported, path).model_copy(update={"scale": 2.0, "material": Conductor()})
+        part = replaced(replaced(imported, path, item), ("delivery", "surface_of"), "lid")
+        assert item.crease_angle == scene_edits.SMOOTH_BELOW
+        made = scene_edits.replace_mesh_of(part, path, scan)
+        now = value_at(made, path)
+        assert (now.shape.path, now.shape.unit, now.crease_angle) == ("meshes/bunny.stl", "in", 0.0)
+        # the name was the file's, and is the new one's
+        assert now.name == made.delivery.surface_of == "bunny"
+        kept = {"shape": item.shape, "crease_angle": item.crease_angle, "name": item.name}
+        assert now.model_copy(update=kept) == item
+        back = value_at(scene_edits.replace_mesh_of(made, path, step), path)
+        assert (back.name, back.crease_angle) == ("lid", scene_edits.SMOOTH_BELOW)
+        named = scene_edits.rename(part, path, "reference part")
+        assert value_at(scene_edits.replace_mesh_of(named, path, scan), path).name == "reference part"
 
     def test_hidden_objects_are_hidden(self, project: Project) -> None:
         made = scene_edits.set_visible(project, (*OBJECTS, 0), False)

@@ -134,8 +134,23 @@ class TestKinds:
         assert session.project.scene.objects[1].model_copy(update={"shape": placed.shape}) == placed
         session.document.undo()
         assert session.project.scene.objects[1] == placed
+        self.scale_to_fit(qtbot, session, inspector)
         session.select(("scene", "objects", 0))
         assert not bar.isVisible()
+
+    def scale_to_fit(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
+        """The new size of a part is told, as what is measured is another one now."""
+        bar, told = inspector.mesh_bar, []
+        before = session.project.scene.objects[1]
+        qtbot.waitUntil(lambda: bar.fit.isEnabled() and bar.told.text().startswith("100 x 50 x 20 mm"))
+        session.message.connect(lambda level, text: told.append((level, text)))
+        qtbot.mouseClick(bar.fit, Qt.MouseButton.LeftButton)
+        by = session.project.scene.objects[1].scale / before.scale
+        expected = f"{before.name} is scaled by {by:.3g}: 100 mm became {100 * by:.4g} mm; Ctrl+Z takes it back"
+        assert by != 1.0 and told == [("info", expected)]
+        assert bar.fit.text() == "Scale to fit" and "Changes its size" in bar.fit.toolTip()
+        session.document.undo()
+        assert session.project.scene.objects[1] == before
 
     def test_a_file_dialog_that_is_cancelled_changes_nothing(
         self, qtbot: QtBot, session: Session, inspector: Inspector, monkeypatch: pytest.MonkeyPatch
