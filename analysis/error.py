@@ -44,6 +44,8 @@ class Errors:
     """The same, m, by what the errors of neighbours have in common: calibration, motion, and the sheet's bias."""
     sheet_bias: Float
     """Part of `position`, px, that the sheet's width explains on curved surfaces and at edges, from the truth."""
+    normal: Float
+    """(m, 3) unit, camera frame: of the facet that is nearest; NaN where there is none."""
     outlier: NDArray[np.bool_]
     """Position wrong by more than 1 px, and by more than 5 robust sigma or half the line's 1/e^2 width."""
     u: Measures
@@ -100,7 +102,8 @@ def compare(
     normals = triangle_normals(vertices, triangles, nearest)
     per_pixel = np.abs(np.einsum("ij,ij->i", points.gradient @ T_world_camera[:3, :3].T, normals))
     step = np.linalg.norm(points.gradient, axis=1)
-    common = systematic_along(points, normals @ T_world_camera[:3, :3], per_pixel * sheet_bias)
+    normals = normals @ T_world_camera[:3, :3]
+    common = systematic_along(points, normals, per_pixel * sheet_bias)
     wrong = outliers(position, 1.0, MATCH_SIGMAS * line.width[points.index, points.rank])
     where = points.index, points.rank
     valid_rows = np.unique(points.index[points.valid])
@@ -113,6 +116,7 @@ def compare(
         sigma_off_surface=per_pixel * points.sigma_pixel,
         systematic_off_surface=common,
         sheet_bias=sheet_bias,
+        normal=normals,
         outlier=wrong,
         u=measure(position, points.sigma_pixel, 1.0, *where),
         depth_z=measure(depth, points.sigma_depth, np.abs(points.gradient[:, 2]), *where),

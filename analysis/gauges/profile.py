@@ -22,6 +22,16 @@ ANY_SIGMA = 1e-6
 
 
 @dataclass(frozen=True)
+class Section:
+    """Which section of the part a profile is of."""
+
+    name: str = ""
+    """In words; empty: it is not said."""
+    others: tuple[tuple[str, Float], ...] = ()
+    """Those that may be chosen in its place: name, and (3,) unit normal in this section's frame."""
+
+
+@dataclass(frozen=True)
 class Profile:
     """(m,) points in the order of their scan lines; all lengths in m.
 
@@ -39,6 +49,11 @@ class Profile:
     """(m,) scan line."""
     correlation_length: Float
     """(m,) scan lines that err alike, as of `Points`."""
+    place: Float | None = None
+    """(m, 3) in the section's frame: off it, across the fan, and away from the laser."""
+    normal: Float | None = None
+    """(m, 3) unit, in the section's frame: of the true surface there, NaN where it is unknown; None: everywhere."""
+    section: Section = Section()
     fitted: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     """The curves that were fitted to it so far, for whoever reads and then draws them; by kind and regions."""
 
@@ -58,6 +73,9 @@ class Profile:
             self.systematic[here],
             self.index[here],
             self.correlation_length[here],
+            None if self.place is None else self.place[here],
+            None if self.normal is None else self.normal[here],
+            self.section,
         )
 
     def whitening(self) -> tuple[Float, Float]:
@@ -90,7 +108,9 @@ class Profile:
         return np.asarray(solve_banded((0, 1), banded, amplitude))
 
 
-def measured_profile(points: Points, errors: Errors | None, T_section_camera: Float) -> Profile:
+def measured_profile(
+    points: Points, errors: Errors | None, T_section_camera: Float, section: Section = Section()
+) -> Profile:
     """Profile of the points that have coordinates and a sigma, in the y and z of a section: a laser's plane or another.
 
     With `errors`, what the sheet's own width moves the line by, known from the truth, counts as one systematic error.
@@ -99,15 +119,21 @@ def measured_profile(points: Points, errors: Errors | None, T_section_camera: Fl
     order = np.flatnonzero(here)[np.argsort(points.index[here], kind="stable")]
     to_section = np.stack([T_section_camera[1, :3], -T_section_camera[2, :3]])
     by_pixel = points.gradient[order] @ to_section.T
+    normal = None
     shared = [] if points.calibration is None else [np.einsum("ij,mjk->mik", to_section, points.calibration[order])]
     if errors is not None:
         shared.append((by_pixel * np.nan_to_num(errors.sheet_bias[order])[:, None])[:, :, None])
+        normal = np.where(errors.outlier[order, None], np.nan, errors.normal[order]) @ T_section_camera[:3, :3].T
+    place = transform_points(T_section_camera, points.camera[order])
     return Profile(
-        position=_in_section(T_section_camera, points.camera[order]),
+        position=np.stack([place[:, 1], -place[:, 2]], axis=1),
         random=by_pixel * points.sigma_pixel[order, None],
         systematic=np.concatenate([np.zeros((len(order), 2, 0)), *shared], axis=2),
         index=points.index[order],
         correlation_length=np.nan_to_num(points.correlation_length[order], nan=1.0),
+        place=place,
+        normal=normal,
+        section=section,
     )
 
 

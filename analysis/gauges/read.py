@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.gauges.area import area_above, section, unseen, without_unsure
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, Gauge, Verdict
+from analysis.gauges.oblique import moved_regions, oblique_remark, obliquity, running_along, square_profile
 from analysis.gauges.profile import Profile
 from analysis.gauges.undetermined import undetermined
 from render.base.arrays import Float
@@ -57,6 +58,13 @@ class Reading:
     """Why there is no value."""
     remark: str = ""
     """What its sigma does not know of."""
+    oblique: float = NAN
+    """rad, by which its section is not square to the faces that it is of; NaN where that changes the value by less than
+    its sigma, or is not known."""
+    square: float = NAN
+    """The value in a section square to them, of the same points; NaN where `oblique` is."""
+    section: str = ""
+    """Of which it was read, in words."""
 
     @property
     def sigma(self) -> float:
@@ -83,7 +91,7 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
         measured = without_unsure(measured, gauge.regions[1])
     found = _value(gauge, measured)
     if isinstance(found, str):
-        return Reading(gauge, step, truth=_true_value(gauge, truth), reason=found)
+        return Reading(gauge, step, truth=_true_value(gauge, truth), reason=found, section=measured.section.name)
     value, gradient, fits = found
     random, systematic = measured.sigmas(gradient)
     used = np.count_nonzero(np.any([one.here for one in fits], axis=0))
@@ -95,8 +103,36 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
         remark += NO_TRUTH if remark and math.isnan(true) else ""
     if not remark and ratio > MISFIT:
         remark = MISFITS.get(gauge.kind, OTHER_SHAPE).format(ratio)
-    sigma, count = ratio * random, int(used)
-    return Reading(gauge, step, value, sigma, systematic, count, true, remark=remark)
+    one = Reading(gauge, step, value, ratio * random, systematic, int(used), true, "", remark)
+    return replace(_beside_square(one, measured), section=measured.section.name)
+
+
+def _beside_square(one: Reading, profile: Profile) -> Reading:
+    """With what it would be square to its faces, where that is another value."""
+    parts = parts_of(one.gauge, profile)
+    along = None if isinstance(parts, str) else running_along(profile, np.max(parts, axis=0))
+    if isinstance(parts, str) or along is None:
+        return one
+    if (square := square_profile(profile, along)) is None:
+        return _told(one, oblique_remark(profile, along, ""), obliquity(along))
+    regions = moved_regions(one.gauge.regions, parts, profile, square)
+    if regions is None:
+        return one
+    fits, function = _fitted(one.gauge.model_copy(update={"regions": regions}), square, parts)
+    value = float(function([each.theta for each in fits]))
+    change = math.remainder(value - one.value, math.tau) if one.gauge.unit == "rad" else value - one.value
+    if not abs(change) > one.sigma:
+        return one
+    return _told(one, oblique_remark(profile, along, _in_words(value, one.gauge.unit)), obliquity(along), value)
+
+
+def _told(one: Reading, told: str, oblique: float, square: float = NAN) -> Reading:
+    return replace(one, remark=f"{told}; {one.remark}" if one.remark else told, oblique=oblique, square=square)
+
+
+def _in_words(value: float, unit: str) -> str:
+    scale, name, places = {"m": (1e3, " mm", 4), "rad": (180.0 / math.pi, "°", 2), "m2": (1e6, " mm²", 3)}[unit]
+    return f"{scale * value:.{places}f}{name}"
 
 
 def _true_value(gauge: Gauge, truth: Profile | None) -> float:

@@ -79,7 +79,7 @@ def beside_nominal(gauge: Gauge) -> str:
 def cells(row: Mapping[str, Any]) -> list[str]:
     """Of COLUMNS, from an entry of the scan's record of measures."""
     unit, ratio = row["unit"], row["error_in_sigmas"]
-    verdict = MARKS.get(row["verdict"] or "", "not measured" if row["reason"] else NONE)
+    verdict = "not measured" if row["reason"] else verdict_text(row["verdict"], row.get("oblique"))
     if row["readings"] > 1 and not row["reason"]:
         counts = row.get("verdicts") or {}
         verdict += f": {counts_text(counts)}" if set(counts) - {"no tolerance"} else ""
@@ -96,6 +96,14 @@ def cells(row: Mapping[str, Any]) -> list[str]:
         small_text(row["error"], unit),
         NONE if ratio is None else f"{ratio:+.2f}",
     ]
+
+
+def verdict_text(verdict: str | None, oblique: float | None = None) -> str:
+    """With its mark, and by how much its section is not square to its faces: rad, None or NaN for nothing."""
+    told = [MARKS[verdict]] if verdict else []
+    if oblique is not None and math.isfinite(oblique):
+        told.append(f"{math.degrees(oblique):.1f}° oblique")
+    return ", ".join(told) or NONE
 
 
 def counts_text(counts: Mapping[str, int]) -> str:

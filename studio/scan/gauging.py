@@ -23,7 +23,7 @@ from render.frame import Frame
 from studio.project.found_motion import measured_pose
 from studio.project.project import ProfileSection, Project
 from studio.scan.own_files import MEASURE_COLUMNS
-from studio.scan.sheet_lean import T_section_camera
+from studio.scan.sheet_lean import T_section_camera, section_of
 from studio.scan.stages import Measurement
 
 OF_SCAN = "it is of a whole scan: run one (F6, Motion), or Measure > Measure the scan again"
@@ -35,7 +35,9 @@ FIGURES = ("value", "sigma_random", "sigma_systematic", "sigma", "truth", "error
 def profiles(project: Project, frame: Frame, found: Measurement, section: ProfileSection) -> tuple[Profile, Profile]:
     """Measured and exact profile of a laser, in a section."""
     T = T_section_camera(project.scene, found.laser, frame.step, section)
-    measured = measured_profile(found.points, found.errors, T)
+    measured = measured_profile(
+        found.points, found.errors, T, section_of(project.scene, found.laser, frame.step, section)
+    )
     return measured, true_profile(frame.curves[found.laser], T, measured)
 
 
@@ -183,4 +185,5 @@ def _row(one: Reading) -> dict[str, Any]:
     row |= {name: getattr(one, name) for name in FIGURES}
     row |= {"points": one.points, "nominal": gauge.nominal, "lower": gauge.lower, "upper": gauge.upper}
     row |= {"verdict": one.verdict, "reason": one.reason, "remark": one.remark}
+    row |= {"oblique": one.oblique, "square": one.square, "section": one.section}
     return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}

@@ -184,7 +184,7 @@ def _readings(found: Any, project: Project) -> tuple[Reading, ...]:
         Reading(
             gauge,
             record["step"] if isinstance(record.get("step"), int) else None,
-            **{name: _number(record.get(name)) for name in VALUES},
+            **_numbers(record),
             points=record["points"] if isinstance(record.get("points"), int) else 0,
             reason=str(record.get("reason", "")),
             remark=str(record.get("remark", "")),
@@ -192,6 +192,11 @@ def _readings(found: Any, project: Project) -> tuple[Reading, ...]:
         for gauge in project.measures
         if isinstance(record := records.get(gauge.name), dict)
     )
+
+
+def _numbers(record: dict[str, Any]) -> dict[str, Any]:
+    """Of VALUES."""
+    return {name: _number(record.get(name)) for name in VALUES}
 
 
 def _number(found: Any) -> float:

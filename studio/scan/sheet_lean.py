@@ -11,11 +11,20 @@ import math
 
 import numpy as np
 
+from analysis.gauges.profile import Section
 from render.base.arrays import Float
 from render.base.pose import invert
 from render.scene.scene import Scene
 from studio.project.project import ProfileSection, Project
 
+SECTIONS: dict[ProfileSection, str] = {
+    "laser_plane": "In the laser's plane",
+    "upright": "In an upright section",
+    "across_x": "In a section across X",
+    "across_y": "In a section across Y",
+    "across_z": "In a section across Z",
+}
+"""As the list of sections, beside the measures in the window, has them."""
 AXES: dict[ProfileSection, str] = {
     "across_x": "the world's X",
     "across_y": "the world's Y",
@@ -65,6 +74,25 @@ def section_normal(T_world_laser: Float, section: ProfileSection) -> Float:
     return np.asarray(along / length * (1.0 if along @ own >= 0.0 else -1.0))
 
 
+def section_of(scene: Scene, laser: int, step: int, section: ProfileSection) -> Section:
+    """Its name, and the others that the list has, as seen from its frame."""
+    T_world_camera = scene.T_world_camera(step)
+    T_world_laser = T_world_camera @ scene.T_camera_laser(laser)
+    turned = T_section_camera(scene, laser, step, section)[:3, :3] @ T_world_camera[:3, :3].T
+    others = tuple(
+        (title, turned @ (T_world_laser[:3, 0] if name == "laser_plane" else section_normal(T_world_laser, name)))
+        for name, title in SECTIONS.items()
+        if name != section
+    )
+    return Section(in_words(section), others)
+
+
+def in_words(section: ProfileSection) -> str:
+    """ "in the laser's plane"."""
+    title = SECTIONS[section]
+    return title[:1].lower() + title[1:]
+
+
 def section_note(project: Project) -> str:
     """For a report, of the lasers that are measured: what their section does to measures; empty: nothing."""
     lasers = sorted({gauge.laser for gauge in project.measures if not gauge.of_scan})
@@ -85,8 +113,9 @@ def lean_text(scene: Scene, laser: int, step: int = 0, section: ProfileSection =
     if lean > NEARLY_LEVEL:
         return "The laser's plane is nearly level: no height of a level part shows in it."
     return (
-        f"Read in the laser's plane, which leans by {math.degrees(lean):.1f}° from the vertical: across a level part a "
-        f"height reads as {1.0 / math.cos(lean):.4g} times itself and angles follow, and the truth does too."
+        f"Read in the laser's plane, which leans by {math.degrees(lean):.1f}° from the vertical: a level part's "
+        f"height reads as {1.0 / math.cos(lean):.4g} times itself, angles follow, and the truth too. The list of "
+        "sections has others."
     )
 
 

@@ -22,9 +22,8 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import DEFINITIONS, MARKS, beside_nominal, counts_text, small_text, value_text
+from analysis.report.gauge_table import DEFINITIONS, beside_nominal, counts_text, small_text, value_text, verdict_text
 from analysis.report.units import NONE
-from studio.project.project import ProfileSection
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.session import Session
@@ -36,18 +35,11 @@ from studio.qt.results.results_profile import ProfilePlot
 from studio.scan.gauging import OF_SCAN, kept_readings, profiles, read_each, step_readings, verdict_counts
 from studio.scan.remarks import best
 from studio.scan.scan_results import ScanResults
-from studio.scan.sheet_lean import lean_text
+from studio.scan.sheet_lean import SECTIONS, lean_text
 
-SECTIONS: dict[ProfileSection, str] = {
-    "laser_plane": "In the laser's plane",
-    "upright": "In an upright section",
-    "across_x": "In a section across X",
-    "across_y": "In a section across Y",
-    "across_z": "In a section across Z",
-}
 SECTION_TIP = (
-    "What measures and profile are of: the laser's plane, as a scanner delivers it, in which heights are longer where "
-    "it leans; or a section across a direction along which the part is the same, in which it is as drawn"
+    "List of sections, what measures and profile are of: the laser's plane, as a scanner delivers it, in which heights "
+    "are longer where it leans; or a section across a direction along which the part is the same, where it is as drawn"
 )
 HEADINGS = ("Name", "Value", "Sigma", "Error", "Verdict")
 AGAIN = "Measure > Measure the scan again"
@@ -254,7 +246,7 @@ class PartTab(QWidget):
             f"<p>{TITLES[gauge.kind]}</p>{DEFINITIONS.get(gauge.kind, '')}",
         )
         if reading is not None:
-            verdict = "not measured" if reading.reason else MARKS.get(reading.verdict or "", NONE)
+            verdict = "not measured" if reading.reason else verdict_text(reading.verdict, reading.oblique)
             figures = [small_text(value, gauge.unit) for value in (reading.sigma, reading.error)]
             texts[1:] = [value_text(reading.value, reading.sigma, gauge.unit), *figures, verdict]
             truth = value_text(reading.truth, reading.sigma, gauge.unit)
@@ -262,7 +254,7 @@ class PartTab(QWidget):
             tip += (
                 f"<p>{reading.reason}</p>"
                 if reading.reason
-                else f"<p>truth {truth}; {reading.points} points{ratio}</p>"
+                else f"<p>truth {truth}; {reading.points} points{ratio}</p><p>{_sentence(reading.remark)}</p>"
             )
         for column, text in enumerate(texts):
             item = self.table.show_cell(row, column, text)

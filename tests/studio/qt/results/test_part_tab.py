@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -297,6 +298,24 @@ def test_an_upright_section_moves_plot_and_measures_and_is_one_step_of_undo(pane
     assert span[1] / span[0] == pytest.approx(np.cos(lean), rel=1e-3)
     session.document.undo()
     assert part.readings[0].value == leaning.value and part.section.currentIndex() == 0
+
+
+def test_an_oblique_section_stands_beside_the_verdict(panel: ResultsPanel) -> None:
+    """A right joint failed by the slant of the section alone, and the table had no more than a fail."""
+    with_a_step(panel.session, nominal=0.1, lower=-0.01, upper=0.01)
+    panel.part.table.selectRow(0)
+    remark = "the section crosses its faces 13.0° obliquely: square to them it is 100.0000 mm; turn the laser"
+    panel.part.readings = (replace(panel.part.readings[0], oblique=0.2269, square=0.1, remark=remark),)
+    panel.part._show()
+    normal = panel.part._profiles[0][0].normal
+    assert normal is not None and np.nanmax(np.abs(np.linalg.norm(normal, axis=1) - 1.0)) < 1e-9
+    assert texts(panel, 0)[-1].endswith("fail, 13.0° oblique") and "square to them it is" in panel.part.told.text()
+
+
+def test_the_hint_names_the_list_of_sections(panel: ResultsPanel) -> None:
+    with_a_step(panel.session)
+    assert "The list of sections has others" in panel.part.told.text()
+    assert panel.part.section.toolTip().startswith("List of sections")
 
 
 def test_a_measure_is_deleted_by_its_key_and_not_by_chance(panel: ResultsPanel, qtbot: QtBot) -> None:

@@ -1,0 +1,98 @@
+"""A section that crosses faces obliquely is told as such beside the measure, with the dimension square to them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.gauges.gauge import Gauge
+from analysis.gauges.profile import Profile, Section
+from analysis.gauges.read import Reading, read
+from render.base.pose import rotation_matrix
+from tests.analysis.gauges.profiles import ACROSS, gauge, shape
+
+LIMITS = {"nominal": math.pi / 2.0, "lower": -math.radians(0.1), "upper": math.radians(0.1)}
+
+
+def through(height: np.ndarray, angle: float, sigma: float = 1e-6) -> Profile:
+    """A part of that profile square to its x, in a plane that is turned by `angle` about the vertical."""
+    slope = np.gradient(height, ACROSS)
+    turn = rotation_matrix(np.array([0.0, 0.0, angle]))
+    own = np.stack([ACROSS * math.tan(angle), ACROSS, -height], axis=1)
+    normals = np.stack([np.zeros(len(slope)), slope, np.ones(len(slope))], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    place, normal = own @ turn.T, normals @ turn.T
+    sight = np.tile([0.0, sigma], (len(height), 1))
+    others = (("In the laser's plane", turn[:, 1]), ("In a section across X", turn[:, 0]))
+    return Profile(
+        position=place[:, 1:] * [1.0, -1.0], random=sight, systematic=np.zeros((len(height), 2, 0)),
+        index=np.arange(len(height)), correlation_length=np.ones(len(height)), place=place, normal=normal,
+        section=Section("in an upright section", others),
+    )  # fmt: skip
+
+
+def read_through(one: Gauge, angle: float, height: np.ndarray | None = None) -> Reading:
+    return read(one, 0, through(shape(one.kind)[0] if height is None else height, angle), None)
+
+
+def test_a_right_joint_that_is_crossed_obliquely_fails_with_the_reason_beside_it() -> None:
+    found = read_through(gauge("opening", **LIMITS), math.radians(13.0))
+    # the flanks of slope 1 come out with slope cos 13 in the plane that crosses them so
+    assert found.value == pytest.approx(math.pi - 2.0 * math.atan(math.cos(math.radians(13.0))), abs=1e-9)
+    assert found.verdict == "fail" and found.square == pytest.approx(math.pi / 2.0, abs=1e-9)
+    assert found.oblique == pytest.approx(math.radians(13.0), abs=1e-9)
+    assert "13.0° obliquely: square to them it is 90.00°" in found.remark
+    assert "choose “In a section across X” in the list of sections, or turn the laser" in found.remark
+    assert found.section == "in an upright section"
+
+
+def test_a_section_square_to_the_faces_has_nothing_beside_it() -> None:
+    found = read_through(gauge("opening", **LIMITS), 0.0)
+    assert found.verdict == "pass" and found.remark == "" and math.isnan(found.oblique) and math.isnan(found.square)
+
+
+@pytest.mark.parametrize(
+    "kind", ["angle", "opening", "width", "v_depth", "radius", "gap", "area", "thickness", "flush"]
+)
+def test_the_dimension_square_to_the_faces_is_that_of_the_part(kind: str) -> None:
+    height, exact = shape(kind)
+    turned = through(height, math.radians(20.0))
+    regions = tuple((low / math.cos(0.349), high / math.cos(0.349)) for low, high in gauge(kind).regions)
+    found = read(Gauge(kind=kind, regions=regions), 0, turned, None)
+    changes = abs(found.value - exact) > found.sigma
+    assert math.isfinite(found.square) == changes
+    if changes:
+        assert abs(found.square - exact) < max(0.02 * abs(found.value - exact), 5.0 * found.sigma)
+
+
+def test_a_flat_face_says_how_far_a_section_leans_from_it_and_a_sphere_says_nothing() -> None:
+    flat = through(-0.5 + 0.002 * (ACROSS > 0.0), 0.0)
+    lean = math.radians(10.0)
+    tilt = rotation_matrix(np.array([0.0, lean, 0.0]))
+    leaning = replace(
+        flat,
+        position=flat.position / [1.0, math.cos(lean)],
+        place=flat.place / [1.0, 1.0, math.cos(lean)] * [0.0, 1.0, 1.0],
+        normal=np.tile([0.0, 0.0, 1.0], (len(ACROSS), 1)) @ tilt,
+    )
+    found = read(gauge("step"), 0, leaning, None)
+    assert found.square == pytest.approx(0.002, abs=1e-8) and found.oblique == pytest.approx(lean)
+    everywhere = np.random.default_rng(1).standard_normal((len(ACROSS), 3))
+    ball = replace(leaning, normal=everywhere / np.linalg.norm(everywhere, axis=1, keepdims=True))
+    assert read(gauge("step"), 0, ball, None).remark == ""
+
+
+def test_a_photograph_has_no_normals_and_says_nothing() -> None:
+    turned = replace(through(shape("opening")[0], 0.3), normal=None, place=None)
+    assert read(gauge("opening"), 0, turned, None).remark == ""
+
+
+def test_a_section_along_the_faces_is_said_to_show_nothing_of_them() -> None:
+    square = through(shape("opening")[0], 0.0)
+    quarter = rotation_matrix(np.array([0.0, 0.0, math.pi / 2.0]))
+    along = replace(square, normal=square.normal @ quarter.T, place=square.place @ quarter.T)
+    found = read(gauge("opening"), 0, along, None)
+    assert "runs along its faces" in found.remark and math.isnan(found.square)
