@@ -60,6 +60,7 @@ MEASURE_COLUMNS = (
     "verdict",
     "reason",
     "remark",
+    "section",
 )
 POINT_COLUMNS = tuple(title(name) for name in UNITS)
 DEVIATION_COLUMNS = ("x_m", "y_m", "z_m", "deviation_m", "sigma_m", "verdict", "laser", "step", "row")
@@ -67,6 +68,7 @@ SECTION_COLUMNS = ("of", "line", "across_m", "up_m", "x_m", "y_m", "z_m", "off_p
 FORMER_POINT_COLUMNS = tuple(name for name in POINT_COLUMNS if not name.startswith("sigma_surface"))
 FORMER_COLUMNS = (
     MEASURE_COLUMNS[:-1],
+    MEASURE_COLUMNS[:-2],
     FORMER_POINT_COLUMNS,
     tuple("error_distance_m" if name == "error_surface_m" else name for name in FORMER_POINT_COLUMNS),
     ("scan_line", *OF_A_POSITION),

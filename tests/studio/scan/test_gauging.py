@@ -55,13 +55,39 @@ def scanned(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_frame_is_read_and_the_plate_is_flat_within_its_sigma(scanned: Path) -> None:
-    with open(scanned / "measures.csv", encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = table(scanned)
     assert [(row["name"], row["step"]) for row in rows] == [("level", "0"), ("level", "1"), ("bow", "1")]
     for row in rows:
         assert abs(float(row["truth"])) < 1e-9
         assert abs(float(row["error"])) < 4.0 * float(row["sigma"]) < 0.02
     assert [row["verdict"] for row in rows] == ["pass", "pass", ""]
+
+
+def test_every_row_says_in_which_section_it_was_read(scanned: Path, tmp_path: Path) -> None:
+    """The same file said first fail and then pass, with another section, and nothing of that."""
+    file = scanned.parent / "across.json"
+    project = open_folder(scanned).project.model_copy(update={"measured_in": "across_y"})
+    file.write_text(project.to_text(), encoding="utf-8")
+    assert {row["section"] for row in table(scanned)} == {"in the laser's plane"}
+    call("reconstruct", scanned, "--project", file, "--out", tmp_path)
+    assert {row["section"] for row in table(tmp_path)} == {"in a section across Y"}
+    assert (tmp_path / "measures.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",remark,section")
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with open(folder / "measures.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_an_oblique_section_stands_beside_the_verdict_in_the_report() -> None:
+    gauge = Gauge.model_validate({"name": "a", **LEVEL})
+    remark = "the section crosses its faces 13.0° obliquely: square to them it is 0.0100 mm; turn the laser"
+    found = Reading(
+        gauge, 0, value=0.2, sigma_random=1e-5, sigma_systematic=0.0, remark=remark, oblique=0.2269, square=1e-5
+    )
+    (row,) = measures_record((gauge,), (found,))
+    assert cells(row)[5] == "✗\u00a0fail, 13.0° oblique" and reasons([row]) == [f"a: {remark}"]
+    assert row["square"] == 1e-5
 
 
 def test_the_record_has_one_entry_a_measure(scanned: Path) -> None:
