@@ -87,6 +87,10 @@ def _as_in_no_cell(study: Study, name: str, base: Project, begun: Project) -> Pr
         with suppress(InputError):  # of boards or effects, or one that the other project does not have
             (there, part), (place, own) = field_place(before, field, field), field_place(data, field, field)
             place[own] = there[part]
+    for now, then in zip(data["scene"]["objects"], before["scene"]["objects"], strict=False):
+        # saving a project writes the digests of its meshes into it, and changes no mesh
+        if "sha256" in now["shape"] and then["shape"].get("sha256", "known") is None:
+            now["shape"]["sha256"] = None
     with suppress(InputError):  # beside other values of now it may not be allowed, and another set-up stays one
         return Project.from_data(data, name).in_folder(base.folder)
     return base

@@ -120,3 +120,20 @@ def test_another_set_up_is_told_by_the_fields_that_differ(tmp_path: Path) -> Non
     )
     with pytest.raises(InputError, match="Bit depth: 12 in the folder, 8 now"), begin(tmp_path, study, now, Engine(1)):
         pass
+
+
+def test_digests_of_meshes_that_saving_writes_lock_nothing_out(tmp_path: Path) -> None:
+    study, bases = study_of("depth_rmse")
+    base = bases["step_block"]
+    shape = {"kind": "file", "path": "meshes/part.ply", "unit": "mm"}
+
+    def with_digest(digest: str | None) -> dict[str, Project]:
+        return {"step_block": base.replaced({"scene.objects[0].shape": {**shape, "sha256": digest}})}
+
+    unsaved, saved, other = (with_digest(digest) for digest in (None, "0" * 64, "1" * 64))
+    for folder, begun in ((tmp_path / "unsaved", unsaved), (tmp_path / "saved", saved)):
+        folder.mkdir()
+        with Store(folder, study.digest(begun)) as store:
+            store.describe(study, begun)
+    assert begun_in(tmp_path / "unsaved", study, saved) == unsaved
+    assert begun_in(tmp_path / "saved", study, other) == other
