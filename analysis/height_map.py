@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.cloud import Cloud
+from analysis.steep import contradicted, steep_triangles
 from render.base.arrays import Float
 from render.base.errors import InputError
 
@@ -28,8 +29,8 @@ FINEST = 1e-9
 """m a level at least."""
 CHUNK = 1 << 18
 """Cells at a time."""
-Means = tuple[NDArray[np.intp], Float]
-"""(n,) cells as means of three points each: (n, 3) points, (n, 3) weights, NaN where there is no surface."""
+Means = tuple[NDArray[np.intp], Float, NDArray[np.intp]]
+"""(n,) cells as means of three points: (n, 3) points, (n, 3) weights, NaN where there is no surface; (n,) triangles."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +50,14 @@ class HeightMap:
     """Median random sigma of a cell, as that of its points."""
     correlation: float
     """Median correlation of a cell's random error with that of its right neighbour."""
+    steep: int = 0
+    """Cells without a height as the surface there is a wall or a jump, or their points contradict each other."""
+    points_without: int = 0
+    """Points within cells without a height."""
 
 
 def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
-    """Heights by linear interpolation between a cloud's points, in the triangles of Delaunay.
+    """Heights by linear interpolation between a cloud's points, in Delaunay triangles, except at walls and jumps.
 
     pitch: m, None for as many cells as there are points. A height is a mean of three points, w^T z, so that its
     variance is w^T C w, C with the correlation of neighbouring scan lines; neighbours that share points err alike.
@@ -85,7 +90,11 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
         found, allowed = f"{columns} x {rows} cells of {pitch:g} m", f"at most {MOST_CELLS} cells"
         raise InputError("the height map would be too large", found=found, allowed=allowed, cure="give a larger pitch")
     heights, sigma, covariance = (np.full(rows * columns, np.nan) for _ in range(3))
+    usual = _median(cloud["sigma_random"])
+    steep = steep_triangles(corners, cloud["z"][mesh.simplices], mesh.simplices, is_surface, usual)
     grid = _Grid(cloud, pitch, columns, float(left), float(top), mesh, is_surface)
+    own, lowest, highest = grid.own_points(rows)
+    without = 0
     for start in range(0, rows * columns, CHUNK):
         cells = np.arange(start, min(start + CHUNK, rows * columns))
         here, beside = grid.weights(cells), grid.weights(cells + 1)
@@ -93,6 +102,9 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
         sigma[cells] = np.sqrt(grid.covariance(here, here))
         known = (cells + 1) % columns != 0
         covariance[cells] = np.where(known, grid.covariance(here, beside), np.nan)
+        wrong = contradicted(heights[cells], steep[here[2]], lowest[cells], highest[cells], pitch, usual)
+        heights[cells[wrong]] = sigma[cells[wrong]] = np.nan
+        without += int(np.count_nonzero(wrong))
     together = covariance[:-1] / (sigma[:-1] * sigma[1:])
     return HeightMap(
         heights.reshape(rows, columns),
@@ -100,9 +112,11 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
         float(origin[1] + top),
         pitch,
         len(xy),
-        _median(cloud["sigma_random"]),
+        usual,
         _median(sigma),
         _median(together),
+        without,
+        int(np.count_nonzero(np.isnan(heights[own[own >= 0]]))) + int(np.count_nonzero(own < 0)),
     )
 
 
@@ -188,10 +202,21 @@ class _Grid:
         two = np.einsum("nij,nj->ni", transform[:, :2], place - transform[:, 2])
         weight = np.column_stack([two, 1.0 - two.sum(axis=1)])
         weight[(found < 0) | ~self.is_surface[found]] = np.nan
-        return self.mesh.simplices[found], weight
+        return self.mesh.simplices[found], weight, found
+
+    def own_points(self, rows: int) -> tuple[NDArray[np.intp], Float, Float]:
+        """(m,) in which cell each point is, -1 for none; and the lowest and highest of each cell, infinite for none."""
+        column = np.round((self.mesh.points[:, 0] - self.left) / self.pitch).astype(np.intp)
+        row = np.round((self.top - self.mesh.points[:, 1]) / self.pitch).astype(np.intp)
+        inside = (column >= 0) & (column < self.columns) & (row >= 0) & (row < rows)
+        cell = np.where(inside, row * self.columns + column, -1)
+        low, high = np.full(rows * self.columns, np.inf), np.full(rows * self.columns, -np.inf)
+        np.minimum.at(low, cell[inside], self.cloud["z"][inside])
+        np.maximum.at(high, cell[inside], self.cloud["z"][inside])
+        return cell, low, high
 
     def heights(self, of: Means) -> Float:
-        vertex, weight = of
+        vertex, weight, _ = of
         return np.asarray((weight * self.cloud["z"][vertex]).sum(axis=1))
 
     def covariance(self, one: Means, other: Means) -> Float:

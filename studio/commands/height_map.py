@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from studio.runtime.streams import print_json
-from studio.scan.height_map import left_out_sentence, points_of, sigma_sentence, write_height_map
+from studio.scan.height_map import left_out_sentence, points_of, sigma_sentence, steep_sentence, write_height_map
 
 
 def make_height_map(
@@ -22,6 +22,8 @@ def make_height_map(
     share = record["valid"] / (record["width"] * record["height"])
     size = f"{record['width']} x {record['height']} cells of {1e3 * record['pitch']:.4g} mm"
     print(f"{path}: {size}, {share:.1%} with a height")
+    if steep := steep_sentence(record["steep"]):
+        print(steep)
     if left_out := left_out_sentence(record["left_out"]):
         print(f"warning: {left_out} --all-heights keeps them, at coarser levels")
     if not quiet:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.cloud import Cloud
 from analysis.deviation import FAR, far_off
 from analysis.measures import robust_sigma
 from render.base.arrays import Float
 from studio.scan.deviation import Compared
 from studio.scan.result_series import Series, symmetric_limit
 
-ENDS, WIDER = (1.0, 99.0), 0.1
-"""Percentiles, and how much wider than these the range is on either side."""
+ENDS = (1.0, 99.0)
+"""Percentiles."""
 BESIDE = 0.25
 """Of the true profile's size, room on either side of it."""
 OVER_TOLERANCE = 2.0
@@ -26,16 +25,6 @@ def deviation_limit(made: Compared) -> float:
         return OVER_TOLERANCE * max(asked)
     value = made.found.value
     return symmetric_limit(value[~far_off(value)])
-
-
-def height_range(points: Cloud) -> Ends | None:
-    """m, of the points that are not far off, where their errors are known; None: there is nothing to show."""
-    heights = points["z"]
-    errors = points.get("error_depth")
-    if errors is not None and np.isfinite(errors).any():
-        heights = heights[~far_off(errors)]
-    heights = heights[np.isfinite(heights)]
-    return _wider(heights, WIDER) if len(heights) else None
 
 
 def profile_range(truth: Series | None, measured: list[Series]) -> tuple[Ends, Ends] | None:

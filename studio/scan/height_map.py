@@ -144,6 +144,7 @@ def _written(
         "y_first": made.y,
         "valid": int(np.count_nonzero(numbers)),
         "left_out": _left_out(made.heights, numbers > 0),
+        "steep": steep_record(made),
         "points": made.points,
         "sigma": sigma_record(made, scale),
     }
@@ -176,6 +177,32 @@ def left_out_sentence(left_out: dict[str, Any]) -> str:
         f"{cells} left out, beyond {' to '.join(kept)} mm, as of stray points: with them heights go from "
         f"{' to '.join(all_of)} mm."
     )
+
+
+def steep_record(made: HeightMap) -> dict[str, Any]:
+    """Cells that walls, jumps and contradictory points leave without a height, and points in no cell with one."""
+    return {"cells": made.steep, "points_without_height": made.points_without}
+
+
+def steep_sentence(steep: dict[str, Any]) -> str:
+    """What `steep` of a record says, for a person; empty where every cell of a surface has a height."""
+    if not steep["cells"]:
+        return ""
+    cells = "1 cell has" if steep["cells"] == 1 else f"{steep['cells']} cells have"
+    points = steep["points_without_height"]
+    return (
+        f"{cells} no height, at walls and jumps, where none is the height of a place; {points} point"
+        f"{' lies' if points == 1 else 's lie'} in cells without one."
+    )
+
+
+def shown_range(made: HeightMap, limits: tuple[float, float] | None) -> tuple[float, float] | None:
+    """m, from the lowest to the highest cell within limits, as of `encoded`; None: there are no two heights."""
+    heights = made.heights[np.isfinite(made.heights)]
+    if limits is not None:
+        heights = heights[(heights >= limits[0]) & (heights <= limits[1])]
+    low, high = (float(heights.min()), float(heights.max())) if len(heights) else (0.0, 0.0)
+    return (low, high) if high > low else None
 
 
 def left_out_of(beside: Path) -> str:

@@ -119,3 +119,45 @@ def test_a_stray_point_does_not_widen_the_map() -> None:
     assert made.heights.shape == clean.heights.shape
     assert (made.x, made.y) == pytest.approx((clean.x, clean.y), abs=1e-12)
     assert np.allclose(made.heights, clean.heights, atol=1e-12, equal_nan=True)
+
+
+def wall_and_top() -> Cloud:
+    """A floor, a wall of 50 mm that 12 profiles climb slantwise, and its top; points 0.3 mm apart along a profile."""
+    step = np.arange(STEPS)[:, None]
+    up = np.linspace(0.0, 0.05, 40)
+    floor, top = np.linspace(0.01, 0.0003, 30), np.linspace(-0.0003, -0.01, 30)
+    x = np.concatenate([floor, 1e-5 * np.sin(40.0 * np.arange(len(up))), top])
+    z = np.concatenate([np.zeros(30), up, np.full(30, 0.05)])
+    y = 1e-3 * step + 0.2 * z + 1e-6 * x
+    count = STEPS * len(x)
+    row = np.tile(np.arange(len(x), dtype=np.int32), STEPS)
+    return {
+        "x": np.tile(x, STEPS), "y": y.ravel(), "z": np.tile(z, STEPS), "sigma_random": np.full(count, SIGMA),
+        "correlation_length": np.ones(count), "row": row, "laser": np.zeros(count, dtype=np.int32),
+        "step": np.repeat(np.arange(STEPS, dtype=np.int32), len(x)),
+    }  # fmt: skip
+
+
+def test_beside_a_wall_no_cell_has_a_height_that_nobody_measured() -> None:
+    """Cells between a wall's top at 250 mm and points on its face held 208, 181 and 149 mm."""
+    cloud = wall_and_top()
+    made = height_map(cloud, 4e-4)
+    heights = made.heights[np.isfinite(made.heights)]
+    between = np.minimum(np.abs(heights), np.abs(heights - 0.05))
+    assert len(heights) > 200 and between.max() < 1.3e-3, "no farther up the wall than its first point"
+    assert np.ptp(heights) == pytest.approx(0.05) and made.steep > 10
+    assert made.points_without >= np.count_nonzero((cloud["z"] > 1e-3) & (cloud["z"] < 0.049))
+
+
+def test_a_jump_between_two_levels_is_not_bridged_and_a_steep_flank_is_kept() -> None:
+    cloud = scan()
+    x = cloud["x"]
+    middle = 3e-4 * ROWS / 2
+    stepped = height_map(cloud | {"z": 0.1 + 1.2e-3 * (x > middle)}, 1e-4)
+    heights = stepped.heights[np.isfinite(stepped.heights)]
+    assert np.minimum(np.abs(heights - 0.1), np.abs(heights - 0.1012)).max() < 3e-4 and stepped.steep > 0
+    flank = height_map(cloud | {"z": 0.1 + 4.0 * np.abs(x - middle)}, 1e-4)
+    places_x, _ = places(flank)
+    known = np.isfinite(flank.heights)
+    assert flank.steep == 0 and flank.points_without < 0.1 * flank.points
+    assert np.abs(flank.heights - 0.1 - 4.0 * np.abs(places_x - middle))[known].max() < 1.3e-3

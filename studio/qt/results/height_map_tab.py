@@ -39,15 +39,17 @@ from studio.qt.viewport.colour_bar import ColourBar
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job
 from studio.scan.colour_scale import PER_METRE, ColourScale
-from studio.scan.first_range import height_range
 from studio.scan.height_map import (
     file_range,
     left_out_sentence,
     picture,
     points_of,
     read_points,
+    shown_range,
     sigma_record,
     sigma_sentence,
+    steep_record,
+    steep_sentence,
     write_made,
 )
 from studio.scan.scan_results import ScanResults
@@ -158,13 +160,14 @@ class HeightMapTab(QWidget):
         folder, pitch = scan.found.folder, 1e-3 * self.pitch.value() or None
         self.told.setText("Making the height map…")
 
-        def work(progress: object, cancelled: object) -> tuple[HeightMap, Range, Range]:
+        def work(progress: object, cancelled: object) -> tuple[HeightMap, Range]:
             points = read_points(points_of(folder))
-            return height_map(points, pitch), height_range(points), file_range(points)
+            return height_map(points, pitch), file_range(points)
 
-        def then(made: tuple[HeightMap, Range, Range]) -> None:
+        def then(made: tuple[HeightMap, Range]) -> None:
             if scan is self._scan:
-                self._first, self._file_range = made[1:]
+                self._file_range = made[1]
+                self._first = shown_range(*made)
                 self._take(made[0])
 
         self.runner.run(LANE, "height map", work, then)
@@ -211,10 +214,11 @@ class HeightMapTab(QWidget):
         if np.isfinite(made.heights).any():
             low, high = 1e3 * np.nanmin(made.heights), 1e3 * np.nanmax(made.heights)
             texts.append(f"Heights from {low:.4g} to {high:.4g} mm")
+            texts.append(steep_sentence(steep_record(made)))
             texts.append(
                 sigma_sentence(sigma_record(made, encoded(made.heights, self._limits())[1])).replace(" um", " µm")
             )
-        self.told.setText("\n".join(texts))
+        self.told.setText("\n".join(filter(None, texts)))
 
     def _draw(self) -> None:
         if self.made is None:

@@ -65,12 +65,13 @@ def test_cells_of_a_stray_point_are_left_out_and_counted_or_kept_where_asked(poi
     write_ply(points, cloud)
     out = points.with_name("map.png")
     done = call(points, "--pitch", "0.5", "--out", out)
-    assert done.exit_code == 0 and "cells are left out" in done.stdout and "--all-heights" in done.stdout
+    assert done.exit_code == 0 and "left out, beyond" in done.stdout and "--all-heights" in done.stdout
     beside = json.loads(out.with_suffix(".json").read_text())
     left_out, heights = beside["left_out"], height_map(read_ply(points), 5e-4).heights
     assert left_out["all_from"] == np.nanmin(heights) and left_out["kept_to"] == np.nanmax(heights)
     assert 0 < left_out["cells"] < 16 and beside["valid"] + left_out["cells"] == np.count_nonzero(np.isfinite(heights))
     assert beside["scale"] < 1e-7
+    assert beside["steep"]["cells"] > 10 and "no height, at walls and jumps" in done.stdout
     done = call(points, "--pitch", "0.5", "--out", out, "--all-heights")
     whole = json.loads(out.with_suffix(".json").read_text())
     assert "left out" not in done.stdout and whole["left_out"]["cells"] == 0 and whole["scale"] > 50 * beside["scale"]

@@ -8,9 +8,11 @@ from typing import cast
 import numpy as np
 import pytest
 
+from analysis.height_map import HeightMap
 from studio.scan.colour_scale import ColourScale
 from studio.scan.deviation import Compared, Question
-from studio.scan.first_range import deviation_limit, height_range, profile_range
+from studio.scan.first_range import deviation_limit, profile_range
+from studio.scan.height_map import file_range, shown_range
 from studio.scan.result_series import Series
 
 RANDOM = np.random.default_rng(4)
@@ -35,12 +37,11 @@ def test_deviations_are_shown_about_as_far_as_is_allowed() -> None:
 def test_heights_are_those_of_the_part() -> None:
     heights = np.concatenate([np.linspace(0.0, 0.031, 900), np.full(100, -0.0695)])
     errors = np.concatenate([RANDOM.normal(0.0, 1e-5, 900), np.full(50, 0.07), np.full(50, np.nan)])
-    ends = height_range({"z": heights, "error_depth": errors})
-    assert ends is not None
-    assert -0.004 < ends[0] < 0.0 and 0.031 < ends[1] < 0.035
-    assert height_range({"z": np.zeros(0)}) is None
-    known_alone = height_range({"z": heights[:900]})
-    assert known_alone == pytest.approx(ends, abs=1e-4), "a scan of photographs has no errors"
+    made = HeightMap(heights[None], 0.0, 0.0, 1e-3, len(heights), 1e-5, 1e-5, 0.0)
+    assert shown_range(made, file_range({"z": heights, "error_depth": errors})) == (0.0, 0.031)
+    assert shown_range(made, None) == (-0.0695, 0.031)
+    level = HeightMap(np.zeros((1, 4)), 0.0, 0.0, 1e-3, 4, 1e-5, 1e-5, 0.0)
+    assert shown_range(level, None) is None
 
 
 def test_a_profile_is_as_large_as_the_true_one() -> None:

@@ -21,8 +21,7 @@ from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Render, Session
 from studio.qt.results.height_map_tab import NOTHING, HeightMapTab, line_sentence
 from studio.scan.deviation import read_cloud
-from studio.scan.first_range import height_range
-from studio.scan.height_map import file_range, read_points
+from studio.scan.height_map import file_range, read_points, steep_record, steep_sentence
 from studio.scan.options import ScanOptions
 from studio.scan.scan import run_scan
 from studio.scan.scan_folder import open_folder
@@ -75,9 +74,12 @@ def test_it_is_the_map_of_the_scans_points(tab: HeightMapTab, scanned: tuple[Pat
     assert tab.view.item.size == (columns, rows) and f"{columns} x {rows} cells" in tab.told.text()
     assert f"{made.sigma_cells / made.sigma_points:.2f} of a point's" in tab.told.text()
     low, high = tab.bar.limits
-    # few cells, of stray points, do not take the colours from the others; the whole range is told
-    assert (low, high) == pytest.approx(tuple(1e3 * np.array(height_range(read_points(scanned[1] / "points.ply")))))
+    # the colours go as far as the file does: a legend beyond that told of heights which there are not
+    ends = file_range(read_points(scanned[1] / "points.ply"))
+    kept = made.heights[(made.heights >= ends[0]) & (made.heights <= ends[1])]
+    assert (low, high) == pytest.approx((1e3 * kept.min(), 1e3 * kept.max()))
     assert f"from {1e3 * np.nanmin(made.heights):.4g} to {1e3 * np.nanmax(made.heights):.4g} mm" in tab.told.text()
+    assert (steep_sentence(steep_record(made)) in tab.told.text()) and bool(made.steep) == ("walls" in tab.told.text())
     # another width of the cells
     tab.pitch.setValue(2e3 * made.pitch)
     qtbot.waitUntil(lambda: tab.made is not made)
