@@ -88,7 +88,9 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         drawing.set(xlabel="mm", ylabel="mm")
         drawing.xaxis.set_major_locator(MaxNLocator(max(1, min(8, round(8.0 * wide / max(tall, 1e-9)))), integer=True))
         named, apart = _of_the_part(what, place)
-        drawing.set_title(f"Deviation from the nominal surface{_without_number(len(place) - len(named))}")
+        drawing.set_title(
+            f"Deviation from the nominal surface, + outside (too much){_without_number(len(place) - len(named))}"
+        )
         fine = np.linspace(edges[0], edges[-1], 49) * 1e6
         counts, _ = np.histogram(clipped, fine)
         middle = (fine[1:] + fine[:-1]) / 2.0
@@ -97,7 +99,7 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
             if limit is not None:
                 bars.axhline(limit * 1e6, color=INK, lw=0.8, ls="--")
         bars.axhline(0.0, color=MUTED, lw=0.6)
-        bars.set(ylabel="deviation (µm), + too much", xlabel="points", ylim=(fine[0], fine[-1]))
+        bars.set(ylabel="deviation (µm), + outside, \u2212 inside", xlabel="points", ylim=(fine[0], fine[-1]))
         bars.set_title("Bands")
         made.canvas.draw()  # where things are is known from here on
         _point_at(drawing, what, place, named, apart)

@@ -156,8 +156,8 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
         ("Tolerance", limits),
         ("Proved within", percent(shares[WITHIN], 2)),
         ("Not decided", percent(shares[UNDECIDED], 2)),
-        ("Proved above", percent(shares[ABOVE], 2)),
-        ("Proved below", percent(shares[BELOW], 2)),
+        ("Proved outside (above)", percent(shares[ABOVE], 2)),
+        ("Proved inside (below)", percent(shares[BELOW], 2)),
     ]
     verdict = verdict_of(judged)
     if far.any() and (without := verdict_of(judged[~far])) != verdict:

@@ -10,10 +10,12 @@ from analysis.deviation import FAR_OFF
 from analysis.report.gauge_table import PLAIN
 from analysis.report.units import micrometres, percent
 from studio.runtime.streams import print_json
-from studio.scan.deviation import Question, compared, write_deviation
+from studio.scan.deviation import MEANING, Question, compared, write_deviation
 
 ANOTHER_SIZE = 2.0
 """Times as large or as small as the part: a nominal of the same part is not, in its own unit."""
+SIDES = {"above": "outside (above the upper limit)", "below": "inside (below the lower limit)"}
+"""What is proved out of the tolerance, by its side of the nominal."""
 MARKS = {"pass": "PASS", "fail": "FAIL", "undecided": "UNDECIDED"}
 
 
@@ -63,6 +65,7 @@ def details(record: dict[str, Any]) -> list[str]:
     """How it was aligned, and what the tolerance says."""
     size = f"Mean {micrometres(record['mean'])}, rms {micrometres(record['rms'])}"
     told = [f"{size}, {micrometres(record['least'])} to {micrometres(record['largest'])}"]
+    told.append(f"Sign of a deviation: {MEANING}")
     times, unit = record["nominal_over_part"], record["nominal_unit"]
     if not 1.0 / ANOTHER_SIZE < times < ANOTHER_SIZE:
         doubt = f"; it was read in {unit}, and may be in another unit" if unit else ""
@@ -78,7 +81,9 @@ def details(record: dict[str, Any]) -> list[str]:
         told.append(f"Aligned by {record['alignment']} ({held}): shifted by {shift} mm, turned by {turn:.4f} deg")
     counts = record["verdicts"]
     if counts is not None:
-        shares = ", ".join(f"{counts[name]} {name}" for name in ("within", "undecided", "above", "below"))
+        shares = ", ".join(
+            f"{counts[name]} {SIDES.get(name, name)}" for name in ("within", "undecided", "above", "below")
+        )
         told.append(f"{percent(record['share_beyond'], 2)} of the points are out of the tolerance's band")
         told.append(f"{MARKS[record['verdict']]} by ISO 14253-1 with two sigma: {shares}")
     if record["median_sigma"] is not None:

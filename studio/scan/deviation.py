@@ -57,6 +57,10 @@ CHORD = 1e-5
 TAKEN = ("x", "y", "z", "sigma_random", "sigma_systematic", "row", "laser", "step")
 ALONG_NORMAL = ("sigma_surface_random", "sigma_surface_systematic")
 """Not in files of former versions, and not known of photographs."""
+MEANING = (
+    "positive is outside the nominal part, too much material, negative inside; errors of depth and surface have the "
+    "other sign, positive is too far from the camera"
+)
 NAMES = {BELOW: "below", WITHIN: "within", ABOVE: "above", UNDECIDED: "undecided"}
 
 
@@ -115,6 +119,7 @@ class Compared:
         return {
             "format": FORMAT,
             "format_version": VERSION,
+            "meaning": MEANING,
             "part": self.question.part,
             "nominal": "as scanned" if self.question.cad is None else self.question.cad.name,
             "nominal_unit": self.nominal_unit,

@@ -20,6 +20,8 @@ REACH_PX = 9
 LEFT, WIDTH = 14, 14
 ABOVE, BELOW = (34, 28), (36, 14)
 """px about the bar: for title and note; in a low view for the title alone."""
+ROOM_FOR_SIDES = 70
+"""px of the bar's height, for words beside its ticks."""
 NARROW, LOW = 480, 150
 """px of width and height of a view of which a bar of the usual size would hide too much."""
 
@@ -35,6 +37,8 @@ class ColourBar(QWidget):
     def __init__(self, view: QWidget) -> None:
         super().__init__(view)
         self.title, self.unit, self.note = "", "", ""
+        self.sides = "", ""
+        """What lies towards the lower and the upper end, of signed values."""
         self.scale = ColourScale()
         self.limits = (-1.0, 1.0)
         self.by_share = True
@@ -62,9 +66,12 @@ class ColourBar(QWidget):
         values: Float,
         image_scale: float = 1.0,
         first: tuple[float, float] | None = None,
+        sides: tuple[str, str] = ("", ""),
     ) -> tuple[float, float]:
-        """Give the limits of (n,) values, and show them; first: as of `ColourScale.limits`."""
-        self.title, self.unit, self.scale = title, unit, scale
+        """Give the limits of (n,) values, and show them; first: as of `ColourScale.limits`, sides: as here."""
+        if sides != self.sides:
+            self.setToolTip(f"+ is {sides[1]}, \u2212 is {sides[0]}. {TIP}" if sides[1] else TIP)
+        self.title, self.unit, self.scale, self.sides = title, unit, scale, sides
         self.limits = scale.limits(values, first)
         self.by_share = scale.by_hand is None and (first is None or scale.by_share)
         self.note = f"at {image_scale:.3g} x size" if image_scale != 1.0 else ""
@@ -178,6 +185,10 @@ class ColourBar(QWidget):
             painter.drawLine(bar.right() + 2, y, bar.right() + 6, y)
             box = QRect(bar.right() + 10, y - 10, self.width() - bar.right() - 12, 20)
             painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, f"{tick(value)} {self.unit}")
+        if bar.height() > ROOM_FOR_SIDES:
+            for y, side in ((bar.bottom() - 18, self.sides[0]), (bar.top() + 18, self.sides[1])):
+                box = QRect(bar.right() + 10, y - 10, self.width() - bar.right() - 12, 20)
+                painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, side)
         painter.setBrush(QColor(c.text))
         painter.setPen(Qt.PenStyle.NoPen)
         for y in (bar.top(), bar.bottom() + 1):

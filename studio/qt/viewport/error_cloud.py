@@ -233,11 +233,18 @@ class ErrorCloud(QObject):
         if deviation is not None and deviation.limit is not None:
             top = deviation.limit * PER_METRE[unit]
             limits = (-top, top)
-        low, high = self.bar.show_scale(title, unit, scale, self.errors, self.image_scale, limits)
+        low, high = self.bar.show_scale(title, unit, scale, self.errors, self.image_scale, limits, self._sides)
         _give(self._data, self.points, scale.colours(self.errors, low, high))
         self._mark()
         self._draw_box()
         self._show_or_hide()
+
+    @property
+    def _sides(self) -> tuple[str, str]:
+        """In words, what is negative and what is positive: a deviation's sign is not that of an error."""
+        if self.meaning == "error" and self.error_view.kind != "position":
+            return "too near", "too far"
+        return ("inside", "outside") if self.meaning == "deviation" else ("", "")
 
     def _values(self, first: Float) -> tuple[str, str, Float]:
         """What colours mean, its unit, and it of each point, in this unit."""

@@ -59,7 +59,10 @@ def test_against_the_part_as_scanned_deviations_are_the_scan_s_own_distances(sca
     assert sum(record["verdicts"].values()) == len(own) and record["verdict"] == "fail"
     assert record == {"ok": True, "files": record["files"], **json.loads((scan / "deviation.json").read_text())}
     assert cv2.imread(str(scan / "deviation.png")) is not None
-    assert call("deviation", scan).exit_code == 0  # replaces its own files
+    assert record["meaning"].startswith("positive is outside the nominal part")
+    said = call("deviation", scan, "--lower=-700", "--upper", 700).stdout  # replaces its own files
+    assert "Sign of a deviation: positive is outside the nominal part" in said
+    assert f"{record['verdicts']['above']} outside (above the upper limit)" in said
 
 
 def test_points_far_off_are_not_called_false(scan: Path) -> None:

@@ -43,7 +43,12 @@ def test_report_and_window_give_the_same_points_the_same_verdicts(
     found = compare_cloud(_standing(scene), tmp_path, cloud(points, errors, 0, 0), Question(lower=lower, upper=upper))
     assert found.verdicts is not None
     judged = {key: percent(float(np.mean(found.verdicts == key)), 2) for key in (WITHIN, UNDECIDED, ABOVE, BELOW)}
-    named = {WITHIN: "Proved within", UNDECIDED: "Not decided", ABOVE: "Proved above", BELOW: "Proved below"}
+    named = {
+        WITHIN: "Proved within",
+        UNDECIDED: "Not decided",
+        ABOVE: "Proved outside (above)",
+        BELOW: "Proved inside (below)",
+    }
     assert {key: rows[name] for key, name in named.items()} == judged
     assert found.record["verdict"] == told["surface"]["verdict"]
     assert not found.sigma_is_bound

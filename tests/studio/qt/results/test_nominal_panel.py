@@ -218,6 +218,7 @@ def test_the_deviation_colours_the_points_while_it_is_looked_at(
     qtbot.waitUntil(lambda: tab.compared is not None)
     found = tab.compared
     assert found is not None and cloud.meaning == "deviation" and cloud.bar.title == "Deviation"
+    assert cloud.bar.sides == ("inside", "outside") and "+ is outside" in cloud.bar.toolTip()
     np.testing.assert_allclose(cloud.errors, 1e6 * found.found.value)
     assert cloud.limit == pytest.approx(200.0), "twice the tolerance, whatever false points there are"
     cloud.bar.units["deviation"] = "mm"
@@ -228,7 +229,7 @@ def test_the_deviation_colours_the_points_while_it_is_looked_at(
     tab.in_view.setChecked(True)
     assert cloud.meaning == "deviation"
     panel.show_tab(panel.section)
-    assert cloud.meaning == "error"
+    assert cloud.meaning == "error" and cloud.bar.sides == ("too near", "too far")
     view.close()
 
 
