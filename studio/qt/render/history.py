@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 
 from render.base.errors import InputError
 from render.output.tone_mapping import Picture, grey
+from render.plan import GroupQuality
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.session import Render, Session
@@ -30,7 +31,11 @@ from studio.qt.render.render_table import RenderTable, keep_render
 from studio.runtime.error_messages import trouble
 from studio.scan.remarks import scale_name, scale_notes
 
-THUMBNAIL = QSize(64, 54)
+THUMBNAIL = QSize(48, 40)
+"""As high as the text beside it."""
+ENTRIES = 3
+"""To be seen at once."""
+ENTRY_HEIGHT = THUMBNAIL.height() + 4
 NEW_LINE = "\u2028"
 """Qt breaks an item's text only here."""
 NAMING = "A name keeps no settings: a render is developed as the project is then whenever it is shown."
@@ -50,27 +55,46 @@ def named(render: Render) -> str:
 
 
 def describe(render: Render) -> str:
-    """Size, quality and time, in one line."""
-    height, width = render.frame.shape
-    small = scale_name(render.scanner_scale)
-    parts = [f"{width} x {height}" + (f", {small}" if small else "")]
-    if render.scan is not None:
-        parts.insert(0, f"step {render.frame.step + 1} of {render.scan.count}")
+    """Size, time and quality, in one line."""
+    ambient = render.frame.quality_of("ambient")
+    parts = [*_size_and_time(render), *_laser(render)]
+    if ambient is not None:
+        # fewer than each pixel was to have: the others take theirs from neighbours
+        few = ambient.work < render.project.render.ambient_samples
+        parts.append(f"ambient {_samples(ambient)} samples a pixel on average{', as most are interpolated' * few}")
+    return ", ".join(parts)
+
+
+def in_short(render: Render) -> list[str]:
+    """The same in two lines that a narrow list has room for."""
+    ambient = render.frame.quality_of("ambient")
+    quality = [*_laser(render), *([] if ambient is None else [f"ambient {_samples(ambient)} samples/px"])]
+    return [", ".join(_size_and_time(render)), ", ".join(quality)]
+
+
+def _samples(ambient: GroupQuality) -> str:
+    return f"{ambient.work:.{0 if ambient.work >= 10.0 else 1}f}"
+
+
+def _laser(render: Render) -> list[str]:
     errors = [
         one.error if one.image_error is None else one.image_error
         for one in render.frame.quality
         if one.group == "direct"
     ]
-    if errors:
-        parts.append(f"laser {max(errors):.2%}")
-    ambient = render.frame.quality_of("ambient")
-    if ambient is not None:
-        # an average: with a goal most pixels are interpolated
-        parts.append(f"ambient {ambient.work:.{0 if ambient.work >= 10.0 else 1}f} samples a pixel")
+    return [f"laser {max(errors):.2%}"] if errors else []
+
+
+def _size_and_time(render: Render) -> list[str]:
+    height, width = render.frame.shape
+    small = scale_name(render.scanner_scale)
+    parts = [f"{width} x {height}" + (f", {small}" if small else "")]
+    if render.scan is not None:
+        parts.insert(0, f"step {render.frame.step + 1} of {render.scan.count}")
     parts.append(f"{sum(render.frame.seconds.values()):.1f} s")
     if not render.final:
         parts.append("under way" if render.refining else "stopped early, Continue goes on")
-    return ", ".join(parts)
+    return parts
 
 
 def thumbnail(render: Render) -> Picture | None:
@@ -87,13 +111,13 @@ def thumbnail(render: Render) -> Picture | None:
     return grey(np.ascontiguousarray(blocks.max(axis=(1, 3))), image.black_level, image.saturation, bright=True)
 
 
-class _TwoLines(QStyledItemDelegate):
+class _ThreeLines(QStyledItemDelegate):
     """The description below the name, which alone is edited."""
 
     def initStyleOption(self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex) -> None:
         super().initStyleOption(option, index)
         render: Render = index.data(Qt.ItemDataRole.UserRole)
-        option.text = f"{title(render)}{NEW_LINE}{describe(render)}"
+        option.text = NEW_LINE.join([title(render), *in_short(render)])
 
 
 class History(QWidget):
@@ -105,8 +129,8 @@ class History(QWidget):
         self.comparison: CompareView | None = None
         self.list = QListWidget()
         self.list.setIconSize(THUMBNAIL)
-        self.list.setMinimumHeight(2 * THUMBNAIL.height() + 16)
-        self.list.setItemDelegate(_TwoLines(self.list))
+        self.list.setMinimumHeight(ENTRIES * ENTRY_HEIGHT)
+        self.list.setItemDelegate(_ThreeLines(self.list))
         self.list.setWordWrap(True)
         self.list.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.list.setEditTriggers(QAbstractItemView.EditTrigger.EditKeyPressed)

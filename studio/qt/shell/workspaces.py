@@ -52,7 +52,7 @@ SETTING_UP = (
 )
 RENDERING = (
     Column(LEFT, 0.74, (("camera", 1.0),)),
-    Column(RIGHT, 0.26, (("render", 0.6), ("develop", 0.4))),
+    Column(RIGHT, 0.26, (("render", 0.68), ("develop", 0.32))),
 )
 MEASURING = (Column(LEFT, 0.42, (("camera", 1.0),)), Column(BOTTOM, 0.5, (("results", 1.0),)))
 STUDYING = (Column(LEFT, 0.32, (("study", 1.0),)), Column(RIGHT, 0.68, (("charts", 1.0),)))

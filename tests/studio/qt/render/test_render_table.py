@@ -13,7 +13,7 @@ from analysis.gauges.gauge import Gauge
 from render.base.errors import InputError
 from studio.project.document import Document
 from studio.qt.core.session import Render, Session
-from studio.qt.render.history import History, describe, title
+from studio.qt.render.history import History, describe, in_short, title
 from studio.qt.render.render_table import FEWEST_PX, as_kept, keep_render, open_render
 from studio.scan.kept_renders import kept_renders
 from studio.scan.redevelop import develop_again, development, measure_again
@@ -170,11 +170,16 @@ def test_the_table_opens_with_room_for_its_columns(qtbot: QtBot, tmp_path: Path)
 
 
 def test_the_list_tells_of_ambient_light_however_few_its_samples_are(qtbot: QtBot) -> None:
-    """With a goal most of its pixels are interpolated."""
+    """With a goal most of its pixels are interpolated, which is said where the words have room."""
     world, frame = small_render()
     few = tuple(replace(one, work=0.2) if one.group == "ambient" else one for one in frame.quality)
-    said = describe(Render(1, small_project(), world, replace(frame, quality=few)))
-    assert frame.quality_of("ambient") is not None and "ambient 0.2 samples a pixel" in said
+    render = Render(1, small_project(), world, replace(frame, quality=few))
+    assert frame.quality_of("ambient") is not None
+    assert "ambient 0.2 samples a pixel on average, as most are interpolated" in describe(render)
+    assert in_short(render)[1].endswith("ambient 0.2 samples/px")
+    many = tuple(replace(one, work=16.0) if one.group == "ambient" else one for one in frame.quality)
+    said = describe(replace(render, frame=replace(frame, quality=many)))
+    assert "ambient 16 samples a pixel on average" in said and "interpolated" not in said
 
 
 def test_a_project_without_a_file_keeps_nothing(qtbot: QtBot) -> None:

@@ -28,6 +28,7 @@ from studio.qt.calibrate.calibration_work import CalibrationWork
 from studio.qt.core import theme
 from studio.qt.core.session import Render, one_of
 from studio.qt.core.widgets import ElidedLabel
+from studio.qt.render.history import in_short
 from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.window import MainWindow
 from studio.qt.shell.workspaces import WORKSPACES, sealed
@@ -113,6 +114,31 @@ def open_measured(window: MainWindow, qtbot: QtBot) -> None:
     world, frame = small_render()
     window.session.add_render(Render(1, small_project(), world, frame))
     qtbot.waitUntil(lambda: bool(window.session.shown.measurements))  # type: ignore[union-attr]
+
+
+def test_three_renders_are_seen_on_a_small_screen_with_all_that_is_told_of_them(
+    window: MainWindow, qtbot: QtBot
+) -> None:
+    before = window.size()
+    open_measured(window, qtbot)
+    world, frame = small_render()
+    for number in (2, 3, 4):
+        window.session.add_render(Render(number, small_project(), world, frame))
+    qtbot.waitUntil(lambda: bool(window.session.shown.measurements))  # type: ignore[union-attr]
+    window.switch_to("render")
+    window.rearrange()
+    window.resize(1366, 768 - BAR)
+    for _ in range(3):
+        QApplication.processEvents()
+    history = window.panels["render"].history.list  # type: ignore[attr-defined]
+    entries = [history.visualItemRect(history.item(row)) for row in range(3)]
+    seen = history.viewport().visibleRegion().boundingRect()
+    window.resize(before)
+    assert all(seen.contains(entry) for entry in entries), f"{entries} in {seen}"
+    beside, metrics = seen.width() - history.iconSize().width() - 12, history.fontMetrics()
+    for line in in_short(window.session.shown):  # type: ignore[arg-type]
+        assert metrics.horizontalAdvance(line) <= beside, line
+        assert 3 * metrics.height() <= entries[0].height() + 3
 
 
 def calibrate_virtual_boards(window: MainWindow, qtbot: QtBot) -> None:
