@@ -2,91 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from PySide6.QtCore import QPointF, Qt
-from PySide6.QtWidgets import QMenu
 from pytestqt.qtbot import QtBot
 
-from studio.project.document import Document
-from studio.project.project import Project
-from studio.project.templates import template_folder
-from studio.qt.core.jobs import JobRunner
-from studio.qt.core.live_preview import live
-from studio.qt.core.session import Session, one_of
 from studio.qt.render.develop_panel import DevelopPanel
-from studio.qt.scene.inspector import Inspector
-from studio.qt.study.charts_panel import ChartsPanel
-from studio.qt.study.study_panel import StudyPanel
-from studio.qt.study.study_work import StudyWork
-from studio.runtime.workers import Engine
 from studio.scan.folder_lock import hold
 from studio.study.draft import VALUES
 from studio.study.store import FILE
 from studio.study.study import ready_made
-
-NOISE = ("sensor", "read_noise")
-POWER = ("scene", "rig", "lasers", 0, "power")
-
-
-class Desk:
-    """The panels of the workspace on a small project, with an inspector beside them."""
-
-    def __init__(self, folder: Path) -> None:
-        project = Project.load(template_folder("plane"))
-        settings = project.render.model_copy(update={"ambient_samples": 1, "laser_error": 0.05, "transport": "direct"})
-        file = folder / "plane.json"
-        project.model_copy(update={"render": settings}).save(file)
-        self.session = Session(Document(Project.load(file), file))
-        self.runner = JobRunner(self.session)
-        self.panel, self.charts = StudyPanel(self.session, self.runner), ChartsPanel(self.session, self.runner)
-        self.inspector = Inspector(self.session)
-        self.work = one_of(StudyWork, self.session)
-        self.session.vary_asked.connect(self.work.vary)
-        self.work.engine = Engine(workers=1)
-
-    def vary(self, item: tuple[Any, ...], *path: Any) -> None:
-        """By the menu of a field of the inspector."""
-        self.session.select(item)
-        menu = QMenu()
-        self.inspector.form.rows[(*item, *path)][0].fill_menu(menu)
-        (action,) = menu.actions()
-        action.trigger()
-
-    def small(self, values: list[float]) -> None:
-        """A study of as many cells as there are values."""
-        if not self.work.sweep["vary"]:
-            self.vary(NOISE[:1], NOISE[1])
-        self.work.set_values(0, {"field": "sensor.read_noise", "values": values})
-        self.work.change(lambda draft: draft.update(image_scale=0.05, repeats=1))
-
-    def close(self) -> None:
-        for panel in (self.panel, self.charts):
-            panel.close()
-        self.runner.close()
-        live(self.session).close()
-
-
-@pytest.fixture
-def desk(qtbot: QtBot, tmp_path: Path) -> Iterator[Desk]:
-    made = Desk(tmp_path)
-    for widget in (made.panel, made.charts, made.inspector):
-        qtbot.addWidget(widget)
-    made.charts.resize(700, 600)
-    made.charts.show()
-    made.panel.show()
-    qtbot.waitExposed(made.charts)
-    yield made
-    made.close()
-
-
-def run(qtbot: QtBot, desk: Desk) -> None:
-    desk.work.start()
-    qtbot.waitUntil(lambda: not desk.work.running)
+from tests.studio.qt.study.desk import NOISE, POWER, Desk, run
 
 
 class TestDraft:
@@ -353,96 +281,3 @@ def test_the_rings_stand_where_the_figure_has_its_marks(desk: Desk) -> None:
         answer = Answer(sweep, spots, None, ())
         drawn = [line.get_xydata() for line in chart(answer, {}).axes[0].lines if len(line.get_xydata()) == 2]
         assert any(np.allclose(np.sort(marks, axis=0), np.sort(places(answer), axis=0)) for marks in drawn)
-
-
-def test_a_study_that_was_not_run_is_there_when_the_project_is_opened_again(desk: Desk, tmp_path: Path) -> None:
-    desk.small([1.0, 2.0])
-    left = desk.work.draft
-    desk.session.replace_document(Document(Project.load(template_folder("sphere"))))
-    assert not desk.work.sweep["vary"]
-    file = tmp_path / "plane.json"
-    desk.session.replace_document(Document(Project.load(file), file))
-    assert desk.work.draft == left
-    again = Session(Document(Project.load(file), file))
-    work = one_of(StudyWork, again)
-    assert work.draft == left
-    work.close()
-    live(again).close()
-
-
-def test_a_window_that_changed_nothing_takes_no_study_away(desk: Desk, tmp_path: Path) -> None:
-    """Of two windows on one project the one in which nothing was put together may be closed last."""
-    file = tmp_path / "plane.json"
-    other = Session(Document(Project.load(file), file))
-    idle = one_of(StudyWork, other)
-    desk.small([1.0, 2.0])
-    idle.close()
-    live(other).close()
-    again = Session(Document(Project.load(file), file))
-    work = one_of(StudyWork, again)
-    assert work.draft == desk.work.draft
-    work.close()
-    live(again).close()
-
-
-def test_a_project_that_has_changed_since_is_told_in_place_of_going_on(
-    desk: Desk, qtbot: QtBot, tmp_path: Path
-) -> None:
-    desk.small([2.0, 20.0])
-    desk.work.choose_folder(tmp_path / "out")
-    run(qtbot, desk)
-    qtbot.waitUntil(lambda: desk.work.estimate is not None)
-    assert desk.session.set(POWER, 0.033)
-    desk.work.look_ahead()
-    assert "study of another set-up" in desk.panel.problem.text() and not desk.panel.foot.run.isEnabled()
-    assert "Power: 20 mW in the folder, 33 mW now" in desk.panel.problem.text()
-    desk.session.document.undo()
-    desk.work.look_ahead()
-    assert desk.work.problem == ""
-    qtbot.waitUntil(lambda: desk.work.estimate is not None)
-
-
-def test_the_projects_own_value_of_a_field_that_is_varied_leaves_it_going_on(
-    desk: Desk, qtbot: QtBot, tmp_path: Path
-) -> None:
-    """Nor do the project's method and name lock it out: no cell takes them of its base."""
-    desk.small([2.0, 20.0])
-    desk.work.choose_folder(tmp_path / "out")
-    run(qtbot, desk)
-    assert desk.session.set(NOISE, 7.0) and desk.session.set(("name",), "another name")
-    assert desk.session.set(("extraction", "method"), "gaussian")
-    desk.small([2.0, 20.0, 30.0])
-    desk.work.look_ahead()
-    assert desk.work.problem == ""
-    run(qtbot, desk)
-    assert desk.work.failure == "" and desk.work.found is not None and len(desk.work.found.rows) == 3
-
-
-def test_a_stopped_study_is_not_said_to_go_on_where_it_does_not(desk: Desk, qtbot: QtBot, tmp_path: Path) -> None:
-    told: list[str] = []
-    desk.small([2.0, 20.0])
-    desk.work.choose_folder(tmp_path / "out")
-    run(qtbot, desk)
-    desk.session.message.connect(lambda _, text: told.append(text))
-    assert desk.work._how_on() == "Go on continues it"
-    assert desk.session.set(POWER, 0.033)
-    desk.work.look_ahead()
-    assert len(told) == 1 and "does not go on as it is set up now" in told[0]
-    assert desk.work._how_on() in told[0]
-
-
-def test_the_folder_of_results_is_there_again_after_a_kill(desk: Desk, qtbot: QtBot, tmp_path: Path) -> None:
-    """Nothing was closed: what was chosen is kept at once."""
-    desk.small([2.0])
-    desk.work.choose_folder(tmp_path / "out")
-    run(qtbot, desk)
-    file = tmp_path / "plane.json"
-    again = Session(Document(Project.load(file), file))
-    work = one_of(StudyWork, again)
-    assert work.draft == desk.work.draft and work.folder == tmp_path / "out"
-    work.look()
-    qtbot.waitUntil(lambda: work.found is not None and len(work.found.rows) == 1)
-    qtbot.waitUntil(lambda: work.estimate is not None and work.estimate.cells == 0)
-    assert work.problem == ""
-    work.close()
-    live(again).close()
