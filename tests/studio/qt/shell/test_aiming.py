@@ -20,6 +20,8 @@ LASER = ("scene", "rig", "lasers", 0)
 def viewport(window: MainWindow, qtbot: QtBot) -> Any:
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
+    there = len(window.session.project.scene.visible_objects)
+    qtbot.waitUntil(lambda: len(live(window.session).look.placed) == there, timeout=60000)
     return window.panels["viewport"]
 
 
