@@ -93,7 +93,7 @@ class Frame:
     plan: Plan = field(default_factory=Plan)
     """What was computed, what was left out, and why."""
     quality: tuple[GroupQuality, ...] = field(default=(), kw_only=True)
-    """How well each light group is known that has begun: of each laser, then ambient light."""
+    """How well each light group is known that has begun, in the order in which they are rendered."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time by stage."""
     foretold: Mapping[str, float] = field(default_factory=dict, kw_only=True)
