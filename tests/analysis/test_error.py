@@ -261,6 +261,14 @@ def box(size: float) -> tuple[np.ndarray, np.ndarray]:
     return corners, np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))], dtype=np.int32)
 
 
+@pytest.fixture(params=["few points", "many points"])
+def either_tree(request, monkeypatch):
+    """Distances by the tree that few points are measured with, and by that for many."""
+    monkeypatch.setattr(distance, "FEW", 50_000 if request.param == "few points" else 0)
+    distance._forget(None)
+
+
+@pytest.mark.usefixtures("either_tree")
 @pytest.mark.parametrize("reversed_winding", [False, True])
 def test_distance_to_a_box_is_right_and_signed_at_faces_edges_and_corners(reversed_winding):
     vertices, triangles = box(0.5)
@@ -282,18 +290,35 @@ def test_distance_to_a_box_is_right_and_signed_at_faces_edges_and_corners(revers
     assert (nearest >= 0).all()
 
 
+@pytest.mark.usefixtures("either_tree")
 def test_the_tree_of_a_mesh_is_built_once_and_goes_with_it():
     vertices, triangles = box(0.5)
     points, camera = np.array([[0.0, 0.0, 0.6]]), np.array([0.0, 0.0, 3.0])
     assert signed_distance(points, vertices, triangles, camera)[0] == pytest.approx(0.1)
-    built = distance._Scene.last
+    built = last_tree()
     signed_distance(points, vertices, triangles, camera)
-    assert built is not None and distance._Scene.last is built
+    assert built is not None and last_tree() is built
     # another mesh, also of the same size, is another tree
     assert signed_distance(points, vertices - [0.0, 0.0, 0.2], triangles, camera)[0] == pytest.approx(0.3)
-    assert distance._Scene.last is None  # what was measured just now is gone already
+    assert last_tree() is None  # what was measured just now is gone already
 
 
+def last_tree():
+    return distance._Locator.last or distance._Raycasting.last
+
+
+def test_a_line_of_sight_through_an_edge_slips_between_no_two_facets():
+    random = np.random.default_rng(5)
+    turn = np.linalg.qr(random.standard_normal((3, 3)))[0]
+    vertices, camera = WALL @ turn.T, np.array([0.3, -0.2, -0.4]) @ turn.T
+    share = random.uniform(0.01, 0.99, (2000, 1))
+    on_edge = (1 - share) * vertices[0] + share * vertices[2]  # the diagonal that both facets share
+    points = camera + 1.1 * (on_edge - camera)
+    found, _ = signed_distance(points, vertices, WALL_TRIANGLES, camera)
+    assert np.all(found < 0.0)
+
+
+@pytest.mark.usefixtures("either_tree")
 def test_distance_off_a_tilted_sheet_keeps_its_sign_within_a_nanometre():
     # an open mesh, a metre away, and points a nanometre off it
     random = np.random.default_rng(6)
@@ -323,6 +348,7 @@ def test_distance_to_a_triangle_is_that_of_a_fine_search():
     assert found[1] == pytest.approx(np.linalg.norm(points[1] - corners[1, 0]))
 
 
+@pytest.mark.usefixtures("either_tree")
 def test_points_on_a_sphere_of_facets_lie_off_it_by_at_most_the_sagitta():
     n, radius = 128, 0.05
     theta, phi = np.meshgrid(np.linspace(0, np.pi, n // 2 + 1), np.linspace(0, 2 * np.pi, n + 1), indexing="ij")

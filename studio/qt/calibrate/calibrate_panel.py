@@ -26,7 +26,7 @@ from studio.qt.calibrate.view_table import ViewTable
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.jobs import JobRunner, time_left
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import ElidedLabel, text_button, thin_bar
+from studio.qt.core.widgets import ElidedLabel, ShareBar, text_button
 from studio.qt.forms.unit_box import UnitBox
 from studio.runtime.jobs import Job, State
 
@@ -107,7 +107,7 @@ class CalibratePanel(QWidget):
         self.problem = QLabel(wordWrap=True)
         self.problem.setObjectName("error")
         self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.bar = thin_bar()
+        self.bar = ShareBar()
         self.stage = QLabel()
         self.stage.setObjectName("muted")
         self.stop = text_button("Stop", "What was found before stays")
@@ -136,7 +136,7 @@ class CalibratePanel(QWidget):
         for widget in (self.bar, self.stage, self.stop):
             widget.setVisible(work.running)
         if not work.running:
-            self.bar.setValue(0)
+            self.bar.show_none()
             self.stage.clear()
         self.save.setEnabled(work.solved is not None)
         self.use.setEnabled(work.solved is not None)
@@ -219,8 +219,7 @@ class CalibratePanel(QWidget):
 
     def _tell_progress(self, job: Job[object]) -> None:
         if job is self.work.job:
-            self.bar.setMaximum(1000 if job.done > 0.0 else 0)  # without a share that is known it runs to and fro
-            self.bar.setValue(round(1000 * job.done))
+            self.bar.show_share(job.done)
             left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
             self.stage.setText("stopping" if job.cancel_asked else f"{job.stage or job.name}   {left}")
 

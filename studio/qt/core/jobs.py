@@ -16,7 +16,8 @@ RENDER = "render"
 """The lane of final renders: there is one at a time in the whole desktop."""
 BUSY = "Something is being rendered: wait for it, or cancel it first (Shift+F5)"
 """What a person is told who asks for another one."""
-PROGRESS_MS = 100
+PROGRESS_MS = 250
+"""Where 3D is drawn by the processor each change of a word is a picture of the whole window."""
 SWITCH_SECONDS = 0.002
 """How long a busy Python thread may keep the interpreter while the window waits for it (Python's own: 5 ms)."""
 

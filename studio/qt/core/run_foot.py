@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from studio.qt.core.jobs import duration, time_left
-from studio.qt.core.widgets import ElidedLabel, flush, text_button, thin_bar
+from studio.qt.core.widgets import ElidedLabel, ShareBar, flush, text_button
 from studio.runtime.jobs import Job, State
 
 
@@ -25,7 +25,7 @@ class RunFoot(QWidget):
         self.choose = text_button("Folder…", folder_tip)
         self.run = text_button("Run…", name="primary")
         self.stop = text_button("Stop", stop_tip)
-        self.bar = thin_bar()
+        self.bar = ShareBar()
         self.stage = QLabel()
         self.stage.setObjectName("muted")
         where = QHBoxLayout()
@@ -53,15 +53,13 @@ class RunFoot(QWidget):
         for widget in (self.bar, self.stage):
             widget.setVisible(running)
         if not running:
-            self.bar.setMaximum(1000)
-            self.bar.setValue(0)
+            self.bar.show_none()
             self.stage.clear()
         self.folder.setText(str(folder) if folder is not None else "no folder yet")
 
     def tell_progress(self, job: Job[object], promised: float | None = None) -> None:
         """promised: s that it was estimated to take, which is not to stand uncorrected while nothing is done."""
-        self.bar.setMaximum(1000 if job.done > 0.0 else 0)  # to and fro until there is a share to show
-        self.bar.setValue(round(1000 * job.done))
+        self.bar.show_share(job.done)
         left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
         if job.done == 0.0 and promised is not None and job.seconds > promised:
             left = f"longer than the {duration(promised)} that were estimated"

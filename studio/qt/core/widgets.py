@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+THOUSANDTHS = 1000
 FRAME = QMargins(2, 32, 2, 2)
 """px of the screen that a title bar and borders take, about."""
 
@@ -73,11 +74,31 @@ def align_labels(*forms: QFormLayout) -> None:
         label.setMinimumWidth(width)
 
 
-def thin_bar() -> QProgressBar:
-    """How far a job is, in thousandths; its words stand beside it."""
-    bar = QProgressBar(maximum=1000, textVisible=False)
-    bar.setMaximumHeight(10)
-    return bar
+class ShareBar(QProgressBar):
+    """How far a job is; its words stand beside it."""
+
+    def __init__(self, height: int = 10) -> None:
+        """height: px at most."""
+        super().__init__(maximum=THOUSANDTHS, textVisible=False)
+        self.setMaximumHeight(height)
+
+    def show_share(self, done: float) -> None:
+        """done: 0..1; of 0 it is not known how far the job is, and the bar runs to and fro.
+
+        It is drawn with all else that changes: by itself Qt would draw it at once, and the whole window with it, as
+        that holds 3D.
+        """
+        most, value = (THOUSANDTHS, round(THOUSANDTHS * done)) if done > 0.0 else (0, 0)
+        if (most, value) != (self.maximum(), self.value()):
+            self.setUpdatesEnabled(False)
+            self.setMaximum(most)
+            self.setValue(value)
+            self.setUpdatesEnabled(True)
+
+    def show_none(self) -> None:
+        """No job."""
+        self.setMaximum(THOUSANDTHS)
+        self.setValue(0)
 
 
 def flush(layout: QBoxLayout, *widgets: QWidget) -> QBoxLayout:

@@ -37,7 +37,7 @@ from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
-from studio.qt.core.widgets import text_button, thin_bar
+from studio.qt.core.widgets import ShareBar, text_button
 from studio.qt.image.image_item import PictureView
 from studio.runtime.jobs import Job, Progress
 from studio.scan.frame_views import picture, views
@@ -80,7 +80,7 @@ class PhotographWindow(QWidget):
         self.limited = QCheckBox("Only within the rectangle")
         self.limited.setToolTip("Drag the rectangle and its corners in the photograph")
         self.measure_button = text_button("Measure", "The line in all photographs of the set", "primary")
-        self.bar = thin_bar()
+        self.bar = ShareBar()
         self.told, self.chosen, self.problem = QLabel(EMPTY), QLabel(), QLabel()
         for label in (self.told, self.chosen, self.problem):
             label.setWordWrap(True)
@@ -240,7 +240,7 @@ class PhotographWindow(QWidget):
         self.limited.toggled.connect(self._limit)
         self.names.currentRowChanged.connect(lambda row: self._show())
         self.runner.failed.connect(self._failed)
-        self.runner.progress.connect(lambda job: self.bar.setValue(round(100 * job.done)))
+        self.runner.progress.connect(lambda job: self.bar.show_share(job.done))
         self.session.renders_changed.connect(self._show_rendered)
         self.session.developed.connect(self._show_rendered)
         self._colour()

@@ -67,6 +67,7 @@ class DevelopPanel(QWidget):
         self._measured: list[Image] | None = None
         """Images that were measured last: of these, other methods are not asked again."""
         self._began = self._free_at = 0.0
+        self._without_figures = False
         self._later = QTimer(self, singleShot=True)
         self._later.timeout.connect(self.refresh)
         self._rest = QTimer(self)
@@ -267,6 +268,8 @@ class DevelopPanel(QWidget):
         render, wait = self.session.shown, self._free_at - time.perf_counter()
         if render is None or render is not self._told_of or not render.refining or wait <= 0.0:
             self.refresh()
+        elif self._without_figures and not render.frame.awaits_ambient:
+            self.refresh()  # the first figures are what is waited for
         elif not self._later.isActive():
             self._later.start(math.ceil(1e3 * wait))
 
@@ -301,7 +304,9 @@ class DevelopPanel(QWidget):
             return images
 
         def then(images: list[Image]) -> None:
-            if render.refining and frame.awaits_ambient:
+            self._without_figures = render.refining and frame.awaits_ambient
+            if self._without_figures:
+                self._rest_from(self._began)
                 return  # figures without its noise would be too good, and take time from it
             self._to_measure = (render, frame, how, images, methods)
             self._rest.start()
@@ -342,13 +347,17 @@ class DevelopPanel(QWidget):
         def then(done: tuple[dict[str, list[Measurement]], list[str]]) -> None:
             found, render.doubts = done
             render.measurements, render.made_from["measurements"], self._measured = found, (frame, how), images
-            now = time.perf_counter()
-            self._free_at = now + RESTED * (now - self._began)
+            self._rest_from(self._began)
             if render is self.session.shown:
                 self._tell_measures(found)
                 self.session.measured.emit()
 
         self.runner.run("measure", "measuring", work, then, interrupt=True)
+
+    def _rest_from(self, began: float) -> None:
+        """What was begun then is done."""
+        now = time.perf_counter()
+        self._free_at = now + RESTED * (now - began)
 
     def _tell_measures(self, found: dict[str, list[Measurement]]) -> None:
         small = f" at {self._told_of.scanner_scale:.3g} x" if self._told_of and self._told_of.scanner_scale != 1 else ""

@@ -26,7 +26,7 @@ from studio.project.project import Project
 from studio.qt.core.boxes import ChoiceBox, DecimalBox, WholeBox
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
 from studio.qt.core.session import Render, Session
-from studio.qt.core.widgets import bring_into_view, text_button, thin_bar
+from studio.qt.core.widgets import ShareBar, bring_into_view, text_button
 from studio.qt.render.history import History
 from studio.qt.render.render_job import can_go_on, render_frames
 from studio.qt.render.render_texts import error_text, plan_text
@@ -105,7 +105,7 @@ class RenderPanel(QWidget):
         self.pause_button = text_button("Pause")
         self.keep_button = text_button("Keep", "Stop here and keep the image as it is")
         self.cancel_button = text_button("Cancel", "Stop and forget this render")
-        self.bar = thin_bar()
+        self.bar = ShareBar()
         self.stage = QLabel()
         self.errors = QLabel(textFormat=Qt.TextFormat.RichText, wordWrap=True)
         self.history = History(session)
@@ -349,7 +349,8 @@ class RenderPanel(QWidget):
     def _tell_progress(self, job: Job[None]) -> None:
         if job is self._job:
             self.pause_button.setText(_to_pause(job))
-            self.bar.setValue(round(1000 * job.done))
+            if job.done > 0.0:  # the status bar's runs to and fro until then
+                self.bar.show_share(job.done)
             left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
             self.stage.setText(f"{job.stage}   {left}")
 
@@ -389,7 +390,7 @@ class RenderPanel(QWidget):
         self.bar.setVisible(running)
         self.stage.setVisible(running)
         if not running:
-            self.bar.setValue(0)
+            self.bar.show_none()
             self.stage.clear()
 
 

@@ -7,11 +7,12 @@ from typing import Any
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QMouseEvent, QMoveEvent, QResizeEvent, QStatusTipEvent
-from PySide6.QtWidgets import QLabel, QProgressBar, QSizePolicy, QStatusBar, QWidget
+from PySide6.QtWidgets import QLabel, QSizePolicy, QStatusBar, QWidget
 
 from studio.qt.core.icons import icon, icon_button
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
 from studio.qt.core.session import Session
+from studio.qt.core.widgets import ShareBar
 from studio.runtime.jobs import Job, State
 
 SHORT = 0.4
@@ -34,10 +35,8 @@ class StatusBar(QStatusBar):
         """Of the command below the mouse."""
         self.setSizeGripEnabled(False)
         self.work = QLabel()
-        self.bar = QProgressBar(maximum=1000)
+        self.bar = ShareBar(14)
         self.bar.setFixedWidth(160)
-        self.bar.setMaximumHeight(14)
-        self.bar.setTextVisible(False)
         self.left = QLabel()
         self.left.setObjectName("muted")
         self.pause = icon_button("pause", "Pause", self.toggle_pause)
@@ -78,11 +77,12 @@ class StatusBar(QStatusBar):
         self.job = job
         paused = job.state is State.PAUSED
         self.work.setText(f"{job.name}: {job.stage}" if job.stage and job.stage != job.name else job.name)
-        self.bar.setMaximum(1000 if job.done > 0.0 else 0)  # without a share that is known it runs to and fro
-        self.bar.setValue(round(1000 * job.done))
+        self.bar.show_share(job.done)
         self.left.setText("stopping" if job.cancel_asked else "paused" if paused else time_left(job.seconds_left))
-        self.pause.setIcon(icon("play" if paused else "pause"))
-        self.pause.setToolTip("Go on" if paused else "Pause")
+        tip = "Go on" if paused else "Pause"
+        if tip != self.pause.toolTip():
+            self.pause.setIcon(icon("play" if paused else "pause"))
+            self.pause.setToolTip(tip)
         self._show_work(True)
 
     def toggle_pause(self) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from PySide6.QtCore import QEvent, QObject
 from PySide6.QtWidgets import QLabel, QPushButton, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
-from studio.qt.core.widgets import Scrolled, bring_into_view
+from studio.qt.core.widgets import Scrolled, ShareBar, bring_into_view
 
 
 def test_a_button_that_is_scrolled_away_is_brought_back(qtbot: QtBot) -> None:
@@ -30,3 +31,34 @@ def test_what_does_not_scroll_stays(qtbot: QtBot) -> None:
     qtbot.addWidget(button)
     bring_into_view(button)
     qtbot.wait(10)
+
+
+def test_a_bar_is_drawn_with_all_else_that_changes(qtbot: QtBot) -> None:
+    """Qt draws another value at once, which in a window with 3D is a picture of the whole window."""
+    drawn: list[int] = []
+
+    class Eye(QObject):
+        def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+            if event.type() == QEvent.Type.Paint:
+                drawn.append(bar.value())
+            return False
+
+    bar, eye = ShareBar(), Eye()
+    qtbot.addWidget(bar)
+    bar.resize(200, 10)
+    bar.show()
+    qtbot.waitExposed(bar)
+    qtbot.wait(50)
+    bar.installEventFilter(eye)
+    drawn.clear()
+    for share in (0.2, 0.5, 0.9):
+        bar.show_share(share)
+    assert not drawn
+    qtbot.waitUntil(lambda: drawn == [900])
+    bar.show_share(0.9)
+    qtbot.wait(50)
+    assert drawn == [900]
+    bar.show_share(0.0)
+    assert bar.maximum() == 0, "to and fro"
+    bar.show_none()
+    assert (bar.maximum(), bar.value()) == (1000, 0)

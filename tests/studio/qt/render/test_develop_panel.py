@@ -279,8 +279,14 @@ def test_no_figure_is_shown_while_the_noise_of_ambient_light_is_to_come(qtbot):
     made.refresh()
     qtbot.waitUntil(lambda: bool(render.images) and not made.busy)
     assert render.frame.awaits_ambient and not render.measurements and AWAITED in heads(session, "")
+    # light without figures waits, so that they come sooner
+    made._rest_from(made._began - 60.0)
+    render.frame = replace(render.frame, seconds=1.0)
+    session.renders_changed.emit()
+    assert made._later.isActive() and made.runner.job("develop") is None
     render.frame = whole
     session.renders_changed.emit()
+    assert made.runner.job("develop") is not None and not made._later.isActive(), "the first figures wait for nothing"
     qtbot.waitUntil(lambda: bool(render.measurements) and not made.busy)
     assert REFINING in heads(session, "")
     render.final = True
