@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numba
@@ -28,6 +27,7 @@ from numpy.typing import NDArray
 from render.base.arrays import Float, Float32
 from render.base.errors import InputError
 from render.base.finite import check_finite
+from render.base.kept_result import kept
 from render.base.threads import map_chunks, rows_of
 from render.frame import Frame
 from render.sampling.poisson import poisson
@@ -116,7 +116,7 @@ def develop(
         ]
     )
 
-    fixed = fixed_pattern(height, width, threads)
+    fixed = fixed_pattern(height, width, threads=threads)
 
     def rows(start: int, stop: int) -> None:
         numbers = np.empty((stop - start, width), dtype=np.uint16)
@@ -285,8 +285,8 @@ def _add_ambient(mean: Float, radiance: Float32, response: Float, first_row: int
                 mean[i, j] += electrons
 
 
-@lru_cache(maxsize=2)
-def fixed_pattern(height: int, width: int, threads: int | None = None) -> Float32:
+@kept(most=2)
+def fixed_pattern(height: int, width: int, *, threads: int | None = None) -> Float32:
     """(h, w, 2) standard normal numbers of the sensor's pixels, for PRNU and DSNU."""
     pattern = np.empty((height, width, 2), dtype=np.float32)
 

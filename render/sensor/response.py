@@ -11,11 +11,11 @@ light is flat within its band: B 400-500 nm, G 500-600 nm, R 600-700 nm, nothing
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 
 from render.base.arrays import Float, Float32
+from render.base.kept_result import kept
 from render.base.pose import Pose
 from render.base.threads import map_chunks
 from render.camera.camera import Camera, Lens
@@ -54,11 +54,11 @@ def relative_illumination(camera: Camera, threads: int | None = None) -> Float32
     if not camera.lens.vignetting:
         return np.broadcast_to(np.float32(1.0), shape)
     # pose and lens do not matter and are reset, so that a moved camera finds the cached image
-    return _cos4(camera.model_copy(update={"T_rig_camera": Pose(), "lens": Lens()}), threads)
+    return _cos4(camera.model_copy(update={"T_rig_camera": Pose(), "lens": Lens()}), threads=threads)
 
 
-@lru_cache(maxsize=2)
-def _cos4(camera: Camera, threads: int | None) -> Float32:
+@kept(most=2)
+def _cos4(camera: Camera, *, threads: int | None) -> Float32:
     image = np.empty((camera.height, camera.width), dtype=np.float32)
     columns = np.arange(camera.width, dtype=np.float64)
 

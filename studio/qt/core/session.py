@@ -192,6 +192,8 @@ class Session(QObject):
     def __init__(self, document: Document) -> None:
         super().__init__()
         self.dragging = False
+        self.measures = False
+        """Somebody develops and measures what is shown."""
         self.selection: FieldPath = ()
         """The item that panels show, and about which several are turned."""
         self._others: tuple[FieldPath, ...] = ()

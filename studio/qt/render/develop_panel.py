@@ -58,6 +58,7 @@ class DevelopPanel(QWidget):
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.session = session
+        session.measures = True
         self.runner = JobRunner(self)
         self.develop_seconds = 0.0
         self._followed = session.project

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from PySide6.QtCore import QObject
+
+from render.base.threads import Cancel
 from render.frame import Frame
 from render.run import Run
 from render.world.world import World, build_world
-from studio.preview.inspection import view_warnings
 from studio.project.project import Project
-from studio.qt.core.session import Render
+from studio.qt.core.session import Render, Session
 from studio.runtime.jobs import Progress
 from studio.scan.kernel_warm_up import all_compiled, begin, needed, warm_up
 from studio.scan.render_goal import goal_of
+
+MOST_SECONDS, LOOK_SECONDS = 3.0, 0.05
+"""That light waits for figures, and between two questions whether it is cancelled."""
 
 
 def render_frames(
@@ -24,13 +31,13 @@ def render_frames(
     world: World | None,
     run: Run,
     progress: Progress,
-    take: Callable[[World, Frame, tuple[str, ...]], None],
+    take: Callable[[World, Frame], None],
+    measured: Callable[[Cancel], None],
 ) -> None:
     """Prepare kernels, load what is not loaded and refine; every frame goes to `take`. Raises InputError, Cancelled.
 
-    With it goes what `inspect` warns of in the first one, which has the line's light.
-
-    run: with the project's seed, whatever its own.
+    run: with the project's seed, whatever its own. measured: returns when figures of the last frame are there; they go
+    before the reflected light, which takes longest and moves them least, unless the time is limited.
     """
     from render.progressive import refine  # takes a while: not before something is rendered
 
@@ -43,7 +50,7 @@ def render_frames(
     if world is None:
         progress("loading meshes", 0.0)
         world = build_world(project.scene, root, step)
-    doubts: tuple[str, ...] | None = None
+    waits = run.seconds is None
     for frame in refine(
         world,
         project.scene,
@@ -53,10 +60,53 @@ def render_frames(
         run=replace(run, seed=project.seed, goal=goal_of(project, run.threads)),
         progress=progress,
     ):
-        take(world, frame, doubts or ())
+        take(world, frame)
         # the line is there before the kernels of all other light
         warm_up(for_all, lambda stage, done: progress(stage, 0.0), run.cancelled)
-        doubts = tuple(view_warnings(project, frame)) if doubts is None else doubts
+        if waits and frame.truth is not None and not frame.awaits_ambient:
+            waits = False
+            measured(run.cancelled)
+
+
+class FirstFigures(QObject):
+    """Waits for the first figures of a render, and warns once of what is wrong with it, as `inspect` does."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.session = session
+        self._render: Render | None = None
+        self._told: set[str] = set()
+        self._there = threading.Event()
+        self._there.set()
+        session.measured.connect(self._measured)
+
+    def of(self, render: Render | None) -> None:
+        """They are of this one, or of one that is to come."""
+        if render is None:
+            self._told.clear()
+        self._render = render
+        self._there.clear()
+
+    def wait(self, cancelled: Cancel) -> None:
+        """On the job's thread, for as long as somebody may be measuring. Raises nothing."""
+        end = time.monotonic() + MOST_SECONDS
+        while self.session.measures and not cancelled() and time.monotonic() < end:
+            if self._there.wait(LOOK_SECONDS):
+                return
+
+    def warn(self, texts: Sequence[str]) -> None:
+        """Of what was not told yet of this render."""
+        for text in texts:
+            if text not in self._told:
+                self._told.add(text)
+                self.session.message.emit("warning", text)
+
+    def _measured(self) -> None:
+        render = self.session.shown
+        if render is not None and render is self._render:
+            self._there.set()
+            self._render = None
+            self.warn(render.doubts)
 
 
 def can_go_on(render: Render | None) -> bool:

@@ -28,7 +28,7 @@ from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
 from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import ShareBar, bring_into_view, text_button
 from studio.qt.render.history import History
-from studio.qt.render.render_job import can_go_on, render_frames
+from studio.qt.render.render_job import FirstFigures, can_go_on, render_frames
 from studio.qt.render.render_texts import error_text, plan_text
 from studio.runtime.jobs import Job, Progress, State
 from studio.scan.stages import scaled
@@ -48,7 +48,7 @@ TRANSPORT = {
 class RenderPanel(QWidget):
     """Starts, holds and stops the render; its frames join the session's history as they get better."""
 
-    _refined = Signal(object, object, object)
+    _refined = Signal(object, object)
 
     def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -61,9 +61,8 @@ class RenderPanel(QWidget):
         """By a person: the render under way."""
         self._memory = Memory()
         """Ambient light of before, for renders that only the lasers tell apart."""
-        self._warned: set[str] = set()
-        """What was told of the render under way."""
         self._state = RenderState({})
+        self._figures = FirstFigures(session)
         self.plan = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
         self.plan.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.laser_error = DecimalBox(decimals=2, minimum=0.01, maximum=100.0)
@@ -147,7 +146,7 @@ class RenderPanel(QWidget):
         self._render, self._before, self._keep = None, session.shown, False
         number = max([render.number for render in session.renders], default=0) + 1
         self._template = (number, project, source, image_scale)
-        self._warned = set()
+        self._figures.of(None)
         self._run(project, root, step, world, RenderState({}))
 
     def _may_start(self) -> bool:
@@ -157,12 +156,12 @@ class RenderPanel(QWidget):
         return True
 
     def _run(self, project: Project, root: Path, step: int, world: World | None, state: RenderState) -> None:
-        refined, limit, self._state = self._refined, self.limit.value() or None, state
+        refined, figures, limit, self._state = self._refined, self._figures, self.limit.value() or None, state
 
         def work(progress: Progress, cancelled: Cancel) -> None:
             kept = lambda: self._keep  # noqa: E731
             run = Run(cancelled=cancelled, keep_partial=kept, seconds=limit, checkpoint=state, memory=self._memory)
-            render_frames(project, root, step, world, run, progress, refined.emit)
+            render_frames(project, root, step, world, run, progress, refined.emit, figures.wait)
 
         self._job = self.runner.run(RENDER, "render", work)
         self._show_state()
@@ -321,7 +320,7 @@ class RenderPanel(QWidget):
                 return render.world
         return None
 
-    def _take_frame(self, world: World, frame: Frame, doubts: tuple[str, ...]) -> None:
+    def _take_frame(self, world: World, frame: Frame) -> None:
         if self._job is None or (self._job.cancel_asked and not self._keep):
             return
         if self._render is None:
@@ -337,14 +336,12 @@ class RenderPanel(QWidget):
                 source=source,
                 asked=self.asked,
             )
+            self._figures.of(self._render)
             self.session.add_render(self._render)
         else:
             self._render.frame = frame.carrying(self._render.frame)
             self.session.renders_changed.emit()
-        for text in (*doubts, *frame.warnings):
-            if text not in self._warned:
-                self._warned.add(text)
-                self.session.message.emit("warning", text)
+        self._figures.warn(frame.warnings)
 
     def _tell_progress(self, job: Job[None]) -> None:
         if job is self._job:

@@ -15,6 +15,7 @@ from render.run import Run
 from render.scene.settings import RenderSettings
 from studio.qt.core.jobs import JobRunner
 from studio.qt.image.compare_view import DIFFERENCE
+from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.render.render_panel import TRANSPORT, RenderPanel
 from studio.runtime.jobs import State
 from studio.scan.compare import compare, resampled
@@ -283,14 +284,17 @@ def test_renders_of_other_sizes_meet_on_the_grid_of_the_first():
     assert same is not None and same.rms == 0.0
 
 
-def test_what_inspect_warns_of_is_told_once_while_it_renders(qtbot, panel):
-    session, told = panel.session, []
+def test_what_inspect_warns_of_is_told_once_as_it_is_measured(qtbot, panel):
+    session, told, develop = panel.session, [], DevelopPanel(panel.session)
+    qtbot.addWidget(develop)
     session.message.connect(lambda level, text: told.append((level, text)))
     session.set(("scene", "rig", "lasers", 0, "power"), 0.0)
     press(qtbot, panel.start_button)
     finish(qtbot, panel)
+    qtbot.waitUntil(lambda: session.shown.final and not develop.busy)
     dark = [text for level, text in told if level == "warning" and "power is 0 W" in text]
     assert len(dark) == 1
+    develop.close()
 
 
 def test_the_goal_is_the_line_or_the_errors_of_the_image(panel: RenderPanel) -> None:
