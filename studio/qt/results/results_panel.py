@@ -71,6 +71,7 @@ class ResultsPanel(QWidget):
         super().__init__(parent)
         self.session = session
         self.pinned: int | None = None
+        self._drawn: tuple[object, ...] = ()
         self.scan_lines: tuple[str, int, int] | None = None
         self.hidden: set[str] = set()
         """Methods that are switched off."""
@@ -148,6 +149,7 @@ class ResultsPanel(QWidget):
     def refresh(self) -> None:
         """Draw everything anew."""
         render, laser = self.session.shown, max(0, self.laser.currentIndex())
+        self._drawn = self._inputs()
         self._make_switches()
         have = render is not None and laser < len(render.frame.curves)
         self.stack.setCurrentIndex(1 if have else 0)
@@ -234,8 +236,7 @@ class ResultsPanel(QWidget):
 
     def _project_changed(self) -> None:
         if self.session.project.measured_in != self.profile.section:
-            region = self.region.region
-            if isinstance(region, Region) and region.along == "fan":
+            if isinstance(region := self.region.region, Region) and region.along == "fan":
                 self.region.choose(None)  # other points lie there in another section
             self.refresh()
         else:
@@ -254,7 +255,12 @@ class ResultsPanel(QWidget):
             self.pinned = None
             self.region.choose(None)
         self.scan_bar.follow()
-        self.refresh()
+        # of light that joins a render nothing is drawn before it is measured
+        self._tell_head() if list(map(id, self._inputs())) == list(map(id, self._drawn)) else self.refresh()
+
+    def _inputs(self) -> tuple[object, ...]:
+        render = self.session.shown
+        return self.scan_bar.whole, render, render and render.frame.curves, render and render.measurements
 
     def _mark(self) -> None:
         """Follow the hovered scan line."""
