@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -16,8 +17,11 @@ RENDER = "render"
 """The lane of final renders: there is one at a time in the whole desktop."""
 BUSY = "Something is being rendered: wait for it, or cancel it first (Shift+F5)"
 """What a person is told who asks for another one."""
-PROGRESS_MS = 250
-"""Where 3D is drawn by the processor each change of a word is a picture of the whole window."""
+PROGRESS_MS, RAREST_MS = 100, 1000
+"""Between two looks at the progress of jobs: where the window is drawn slowly they are rarer."""
+DRAWING = 0.1
+"""Share of the time for drawing progress, at most: where 3D is drawn by the processor, which the jobs need, a word that
+changes is a picture of the whole window."""
 SWITCH_SECONDS = 0.002
 """How long a busy Python thread may keep the interpreter while the window waits for it (Python's own: 5 ms)."""
 
@@ -142,8 +146,15 @@ class JobRunner(QObject):
                 self._start(lane, waiting)
 
     def _tell(self) -> None:
+        began = time.perf_counter()
         for job in list(self._running.values()):
             self.progress.emit(job)
+        # once what changed is drawn
+        QTimer.singleShot(0, self, lambda: self._space(time.perf_counter() - began))
+
+    def _space(self, drawn: float) -> None:
+        """drawn: s that the last look took."""
+        self._timer.setInterval(round(min(max(PROGRESS_MS, 1e3 * drawn / DRAWING), RAREST_MS)))
 
 
 def time_left(seconds: float | None) -> str:
