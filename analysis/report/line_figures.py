@@ -148,7 +148,7 @@ def zoom_figure(laser: LaserResult, white: float) -> str | None:
             axes.grid(False)
             axes.set(xlim=extent[:2], ylim=extent[2:])
             axes.locator_params(nbins=4)
-            axes.set_title(f"{number}  {place.name}: {position[place.point]:+.3f} px")
+            axes.set_title(f"{number}  {place.name}: {round(position[place.point], 3) + 0.0:+.3f} px")
         return png_uri(made)
 
 

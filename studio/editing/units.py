@@ -92,7 +92,7 @@ def plain(value: float, decimals: int) -> str:
     """Up to `decimals` digits after the point, more for small numbers, at most about nine in all."""
     if abs(value) < 1e-12:
         return "0"
-    if abs(value) >= 1e7 or abs(value) < 1e-6:
+    if abs(value) >= 1e9 or abs(value) < 1e-6:
         return f"{value:.4g}"
     digits = decimals if abs(value) >= 10.0 ** (2 - decimals) else decimals - math.floor(math.log10(abs(value))) - 1
     digits = min(digits, max(0, 8 - math.floor(math.log10(abs(value)))))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 from pathlib import Path
 
@@ -73,7 +74,10 @@ def carry(project: Project, root: Path, folder: Path) -> list[Path]:
     pairs = []
     named = named_files(project.scene, "scene")
     if project.delivery.logo:
-        named[project.delivery.logo] = "delivery.logo"
+        # one outside of the folder is not shown, which is told where it is named: it keeps nobody from saving
+        with contextlib.suppress(InputError):
+            inside(root, project.delivery.logo, "delivery.logo")
+            named[project.delivery.logo] = "delivery.logo"
     weights = project.extraction.chooser
     if weights is not None:
         named |= dict.fromkeys((weights, str(Path(weights).with_suffix(".json"))), "extraction.chooser")

@@ -213,7 +213,8 @@ class RowProfile(QWidget):
             for y in fitted_profile(line, index, image, x, integrated)[:1]:
                 self._add(pg.PlotCurveItem(x, y, pen=pg.mkPen(colour, width=1.6)))
                 self._top = max(self._top, float(y.max()))
-        error = f" {u - true[np.argmin(np.abs(true - u))]:+.3f} px" if len(true) else ": no line is seen here"
+        off = round(u - float(true[np.argmin(np.abs(true - u))]), 3) if len(true) else 0.0
+        error = f" {off + 0.0:+.3f} px" if len(true) else ": no line is seen here"
         caution = CAUTIONS.get(Flag(int(line.flag[index, valid[0]])), "")
         return f"<span style='color:{colour}'>{method_name(method)}{error}{caution and f', {caution}'}</span>"
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from analysis.line.settings import ExtractionSettings
+from analysis.report.delivery import Delivery
 from render.base.errors import InputError
 from render.camera.camera import Camera
 from render.material.material import Blend, Coated, Lambertian, Texture
@@ -81,3 +82,12 @@ def test_a_path_that_leaves_the_folder_is_refused(root: Path, tmp_path: Path) ->
     away = Scene(rig=RIG, objects=(SceneObject(name="part", shape=MeshFile(path="../part.ply")),))
     with pytest.raises(InputError):
         carry(Project(scene=away), root, tmp_path / "to")
+
+
+def test_a_logo_outside_of_the_folder_keeps_nobody_from_saving(root: Path, tmp_path: Path) -> None:
+    (tmp_path / "logo.png").write_text("elsewhere")
+    for logo, taken in (("../logo.png", set()), ("wood.png", {"wood.png"})):
+        project = Project(scene=Scene(rig=RIG), delivery=Delivery(logo=logo))
+        to = tmp_path / logo.replace("/", "-")
+        to.mkdir()
+        assert {str(file.relative_to(to)) for file in carry(project, root, to)} == taken
