@@ -36,6 +36,8 @@ LEVER = 1e-3
 """The same of six spots, each of which counts: how short the levers between them may be."""
 HELD_BY = ("primary 1", "primary 2", "primary 3", "secondary 1", "secondary 2", "tertiary")
 FEWEST = 6
+NEIGHBOURS = 5
+"""Points, itself among them, whose median tells whether a point stands alone."""
 SMALL = 0.25
 
 
@@ -166,18 +168,34 @@ def sigma_of_deviation(random: Float, systematic: Float) -> Float:
     return np.asarray(np.hypot(random, np.nan_to_num(systematic)))
 
 
-def verdicts(value: Float, sigma: Float, lower: float, upper: float) -> Verdicts:
-    """(m,) by ISO 14253-1 with U = 2 sigma: proved within, proved beyond, or undecided, as where sigma is NaN."""
-    uncertainty = 2.0 * sigma
+def verdicts(points: Float, value: Float, sigma: Float, lower: float, upper: float) -> Verdicts:
+    """(m,) by ISO 14253-1: proved within, proved beyond, or undecided, as where sigma is NaN, of points (m, 3).
+
+    U = 2 sigma for what is within, as the whole part is if all of it is. One place beyond is enough for it to be out,
+    and of thousands of points some are beyond by two of their sigmas by chance: for what is beyond U is as large as
+    lets chance find a single one of all of them as rarely as two sigmas do of one (Bonferroni), and the median of its
+    NEIGHBOURS has to be beyond the limit as well, as no stray point is a place of the part.
+    """
     found = np.full(len(value), UNDECIDED, dtype=np.int8)
-    found[(value - uncertainty >= lower) & (value + uncertainty <= upper)] = WITHIN
-    found[value + uncertainty < lower] = BELOW
-    found[value - uncertainty > upper] = ABOVE
+    found[(value - 2.0 * sigma >= lower) & (value + 2.0 * sigma <= upper)] = WITHIN
+    uncertainty = coverage_of_all(len(value)) * sigma
+    below, above = value + uncertainty < lower, value - uncertainty > upper
+    some = np.flatnonzero(below | above)
+    if len(some):
+        _, around = scipy.spatial.cKDTree(points).query(points[some], k=min(NEIGHBOURS, len(points)))
+        local = np.median(value[around.reshape(len(some), -1)], axis=1)
+        found[some[below[some] & (local < lower)]] = BELOW
+        found[some[above[some] & (local > upper)]] = ABOVE
     return found
 
 
+def coverage_of_all(count: int) -> float:
+    """Sigmas that the largest of `count` normal errors exceeds as rarely as a single one exceeds two."""
+    return float(-scipy.special.ndtri(scipy.special.ndtr(-2.0) / max(count, 1)))
+
+
 def verdict_of(judged: Verdicts) -> Verdict:
-    """Of the whole part: it fails by one proved point, and passes only if all are proved."""
+    """Of the whole part: it fails by one point that is proved beyond, and passes only if all are proved within."""
     if np.isin(judged, (BELOW, ABOVE)).any():
         return "fail"
     return "undecided" if (judged == UNDECIDED).any() else "pass"

@@ -34,13 +34,15 @@ VERDICTS = {
     "undecided": "Not decided within the uncertainty",
     "none": "No tolerance was given",
 }
+DECIDED_BY = {"fail": "Out", "undecided": "Not decided"}
 FAR_AND_FALSE = (
     "A point is far off by its distance from the surface alone; a false scan line carries a point although no line "
     "crosses its centre, at whatever distance."
 )
 RULE = (
     "By ISO 14253-1 with an expanded uncertainty of two sigma: within only what is proved to be within, "
-    "out only what is proved to be out."
+    "out only what is proved to be out. A surface is out where a place of it is, by more than chance does to the worst "
+    "of all its points."
 )
 
 
@@ -63,6 +65,8 @@ def front(report: ReportInput) -> dict[str, Any] | None:
         "verdict": verdict,
         "verdict_text": VERDICTS[verdict],
         "judged": _judged(bool(surface["verdict"]), gauges, judged_objects(report)),
+        "decided_by": _decided_by(verdict, surface["verdict"], gauges, [str(row["name"]) for row in report.measures]),
+        "part_of": report.part_of,
         "rule": RULE if verdict != "none" else "",
         "surface": surface,
         "map": _map(report, rows) if len(rows) else None,
@@ -128,6 +132,15 @@ def _judged(surface: bool, gauges: list[str], objects: str) -> str:
     return f"Of {' and '.join(of)}{rest}."
 
 
+def _decided_by(verdict: str, surface: str, gauges: list[str], names: list[str]) -> str:
+    """What it is that is out, or is not decided; empty: nothing is."""
+    if verdict not in DECIDED_BY:
+        return ""
+    of = [*(["the surface"] if surface == verdict else [])]
+    of += [name for name, one in zip(names, gauges, strict=True) if one == verdict]
+    return f"{DECIDED_BY[verdict]}: {', '.join(of)}."
+
+
 def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
     """Verdict and table of the surface's deviation."""
     told, value = report.delivery, -rows["off_surface"]
@@ -148,7 +161,7 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
         return {"verdict": "", "mark": "", "rows": table, "note": note}
     lower = -math.inf if told.lower is None else told.lower
     upper = math.inf if told.upper is None else told.upper
-    judged = verdicts(value, _sigma(rows), lower, upper)
+    judged = verdicts(rows["world"], value, _sigma(rows), lower, upper)
     shares = {key: float(np.mean(judged == key)) for key in (WITHIN, UNDECIDED, ABOVE, BELOW)}
     ends = ["none" if limit is None else f"{1e6 * limit:+.4g}" for limit in (told.lower, told.upper)]
     limits = f"{' / '.join(ends)}\u00a0µm"

@@ -45,6 +45,8 @@ class ReportInput:
     """Library -> version."""
     notes: tuple[str, ...] = ()
     """Warnings and remarks of the run, one sentence each; shown near the top."""
+    part_of: str = ""
+    """Of which scan it is one step, a sentence; empty: it is whole. Among the notes as well."""
     image_scale: float = 1.0
     """Pixels a side of what was measured, over those of the scanner."""
     created: str = ""

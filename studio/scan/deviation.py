@@ -191,7 +191,8 @@ def compare_cloud(scene: Scene, root: Path, cloud: Cloud, question: Question) ->
     judged = None
     if question.lower is not None or question.upper is not None:
         lower = -math.inf if question.lower is None else question.lower
-        judged = verdicts(made.value, sigma, lower, math.inf if question.upper is None else question.upper)
+        upper = math.inf if question.upper is None else question.upper
+        judged = verdicts(made.points, made.value, sigma, lower, upper)
     columns = {name: cloud[name][here] for name in ("laser", "step", "row")}
     towards = (eyes - points).mean(axis=0)
     others, is_bound = int(np.count_nonzero(~here)), not bool(known_normal[here].all())

@@ -6,7 +6,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.cloud import Cloud, cloud, merge, write_csv, write_ply
@@ -86,6 +86,7 @@ def export_report(path: Path, what: Exported) -> list[Path]:
             image_scale=what.image_scale,
             run=_run_text(what, record),
         )
+        data = replace(data, part_of=what.part_of)
         if path.suffix.lower() != ".pdf":
             with atomic_write(path) as temporary:
                 temporary.write_text(render_page(data), encoding="utf-8")

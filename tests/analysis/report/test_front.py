@@ -88,7 +88,10 @@ def test_the_worst_measure_decides() -> None:
         ((None, "pass"), "undecided"),
     ):
         rows = tuple(gauge(one, "" if one else "no points") for one in verdicts)
-        assert told(replace(report, measures=rows))["verdict"] == expected
+        found = told(replace(report, measures=rows))
+        assert found["verdict"] == expected
+        deciding = [one for one in rows if (one["verdict"] or "undecided") == expected != "pass"]
+        assert found["decided_by"].count("Height") == len(deciding)
 
 
 def test_a_tolerance_has_its_limits_in_order_and_one_alone_is_one() -> None:
