@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import gc
 import signal
+from collections.abc import Iterator
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, print_blob=True)
@@ -16,6 +18,15 @@ settings.load_profile("repeatable")
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def quick_reports() -> Iterator[None]:
+    """See tests/quick_reports.py."""
+    from tests.quick_reports import drawn_quickly
+
+    with drawn_quickly():
+        yield
 
 
 def pytest_collection_finish() -> None:

@@ -11,6 +11,8 @@ from analysis.report.calibration import FoundCalibration, MotionFound, depth_map
 from analysis.report.write import render_page
 from tests.analysis.report.test_report import make_report, make_scene
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 DEPTHS = np.array([0.4, 0.6])
 
 

@@ -18,6 +18,8 @@ from analysis.report.total import total
 from analysis.report.write import render_page
 from tests.analysis.report.test_report import make_report
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 
 def handed(**fields: Any) -> ReportInput:
     return replace(make_report(), delivery=Delivery(**fields))

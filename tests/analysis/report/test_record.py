@@ -73,7 +73,7 @@ def test_quantiles_of_the_sample_are_those_of_the_scan_within_its_spread(both: t
     assert abs(part.u.autocorrelation - whole.u.autocorrelation) < 4 / np.sqrt(n)
 
 
-def test_the_report_says_which_figures_are_of_a_sample() -> None:
+def test_the_report_says_which_figures_are_of_a_sample(quick_reports: None) -> None:
     report = make_report(steps=3)
     record = long_scan(SMALL)
     page = render_page(dataclasses.replace(report, record=record))

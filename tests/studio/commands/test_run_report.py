@@ -25,6 +25,7 @@ from studio.scan.export import Exported, export_report
 from studio.scan.redevelop import develop_again, development, measure_again
 from studio.scan.run_record import ELEMENT, read_run, unequal
 from studio.scan.stages import scaled
+from tests.quick_reports import drawn_quickly
 from tests.studio.small_scan import SCALE, contents, scan, small_project
 
 
@@ -36,7 +37,8 @@ def call(*arguments: object) -> Result:
 def scanned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A project's folder, with a scan of a seed and scale of its own in `out`."""
     folder = tmp_path_factory.mktemp("project")
-    scan(small_project(folder), folder / "out", report=True, seed=7)
+    with drawn_quickly():
+        scan(small_project(folder), folder / "out", report=True, seed=7)
     return folder
 
 
@@ -149,7 +151,7 @@ def exported(folder: Path, **kept: Any) -> Exported:
     return Exported(how.powered, project, folder, world, frame, tuple(images), found, SCALE, **kept)
 
 
-def test_a_report_of_the_window_runs_again_to_the_bit(tmp_path: Path) -> None:
+def test_a_report_of_the_window_runs_again_to_the_bit(tmp_path: Path, quick_reports: None) -> None:
     page, out = tmp_path / "project" / "seen.html", tmp_path / "out"
     export_report(page, exported(page.parent, repeatable=True))
     done = call("run", page, "--no-report", "--out", out, "--json", "--quiet")
@@ -159,7 +161,7 @@ def test_a_report_of_the_window_runs_again_to_the_bit(tmp_path: Path) -> None:
     assert [one["method"] for one in rows] == ["likelihood", "centre_of_mass"] and rows[0]["points"] > 0
 
 
-def test_a_report_that_no_run_repeats_holds_no_record(tmp_path: Path) -> None:
+def test_a_report_that_no_run_repeats_holds_no_record(tmp_path: Path, quick_reports: None) -> None:
     page = tmp_path / "seen.html"
     what = exported(tmp_path, repeatable=True)
     laser = what.project.scene.lasers[0]

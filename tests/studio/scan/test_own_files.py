@@ -50,7 +50,7 @@ def test_points_of_a_photograph_take_no_other_file_s_place(suffix: str, tmp_path
     assert mine.read_text() == "mine"
 
 
-def test_all_that_a_scan_writes_is_known_as_its_own(tmp_path: Path) -> None:
+def test_all_that_a_scan_writes_is_known_as_its_own(tmp_path: Path, quick_reports: None) -> None:
     scan(small_project(tmp_path / "project"), tmp_path / "out", report=True)
     unknown = [path.name for path in (tmp_path / "out").iterdir() if not is_own(path)]
     assert unknown == ["scan_project.json"]  # a project like any other: the manifest tells it

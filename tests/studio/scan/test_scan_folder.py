@@ -26,6 +26,7 @@ from studio.scan.folder_lock import LOCK, hold
 from studio.scan.options import Listener
 from studio.scan.reconstruct import reconstruct_folder
 from studio.scan.stages import Clock
+from tests.quick_reports import drawn_quickly
 from tests.studio.small_scan import SCALE, contents, scan, small_project, write_plate
 
 
@@ -33,7 +34,8 @@ from tests.studio.small_scan import SCALE, contents, scan, small_project, write_
 def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the project in `project`, its finished scan in `out`."""
     folder = tmp_path_factory.mktemp("original")
-    scan(small_project(folder / "project"), folder / "out", report=True)
+    with drawn_quickly():
+        scan(small_project(folder / "project"), folder / "out", report=True)
     return folder
 
 
@@ -238,7 +240,7 @@ class TestMeasuringFrames:
         with pytest.raises(InputError, match=r"frame_0001\.json: the frame's description has changed"):
             reconstruct(made)
 
-    def test_what_the_points_were_measured_with_is_kept_for_the_report(self, made: Path) -> None:
+    def test_what_the_points_were_measured_with_is_kept_for_the_report(self, made: Path, quick_reports: None) -> None:
         assert scan_folder.measured_project(scan_folder.open_folder(made / "out")) == small(made)
         other = replaced(small(made), ("extraction", "method"), "centre_of_mass")
         reconstruct(made, other, made / "out")

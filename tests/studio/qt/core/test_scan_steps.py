@@ -115,7 +115,7 @@ class TestOpened:
         assert f"Row {row}" in results_of(opened).reading.text() and render.frame.step == 1
 
     def test_their_scale_is_told_wherever_figures_stand(
-        self, opened: MainWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+        self, opened: MainWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, quick_reports: None
     ) -> None:
         panel, render = results_of(opened), opened.session.shown
         assert render is not None and render.scanner_scale == SCALE

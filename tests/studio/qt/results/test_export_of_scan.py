@@ -91,7 +91,9 @@ def test_points_are_of_all_steps_or_of_the_one_that_is_asked_for(bench: Bench, t
     assert "of step 1 of 3" in bench.told[-1][1]
 
 
-def test_a_report_is_of_all_steps_with_the_measures_of_now(bench: Bench, tmp_path: Path, qtbot: QtBot) -> None:
+def test_a_report_is_of_all_steps_with_the_measures_of_now(
+    bench: Bench, tmp_path: Path, qtbot: QtBot, quick_reports: None
+) -> None:
     """A step's verdict alone read "within tolerance" where the scan's own was not decided."""
     bench.session.set(("measures",), (FLATNESS,))
     before = sorted(file.name for file in bench.bar.whole.found.folder.iterdir())  # type: ignore[union-attr]
