@@ -110,6 +110,7 @@ def test_parameters_and_covariance_are_those_of_scipy() -> None:
     )
 
 
+@pytest.mark.validation
 def test_errors_are_as_large_as_told_and_regions_cover() -> None:
     there = truth(8, 8, terms=4, lasers=1, warp=(1e-4, 0.0))
     exact = views_of(there)

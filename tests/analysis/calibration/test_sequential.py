@@ -29,6 +29,7 @@ def test_exact_views_give_the_truth(name: str, terms: int, lasers: int) -> None:
         np.testing.assert_allclose(unit_plane(m), unit_plane(exact), atol=1e-5)
 
 
+@pytest.mark.validation
 def test_with_few_views_the_joint_adjustment_loses_less_depth() -> None:
     """It knows the camera better by the lines, and their plane by the poses' own errors."""
     off: dict[str, list[float]] = {"jointly": [], **{name: [] for name in WAYS}}
