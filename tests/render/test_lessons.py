@@ -65,12 +65,12 @@ def test_a_learnt_fan_reaches_all_that_another_frame_sees():
 
 
 @cache
-def renders() -> tuple[list[Frame], list[Frame]]:
+def renders(seeds: int) -> tuple[list[Frame], list[Frame]]:
     """One step of a small scan, alone and taught by the step before, with one seed each."""
     project = scaled(Project.load(FOLDER / "project.json"), 0.08)
     project = project.replaced({"render.truth_images": False, "render.transport": "interreflection"})
     world, alone, taught = build_world(project.scene, FOLDER, 0), [], []
-    for seed in range(SEEDS):
+    for seed in range(seeds):
         lessons = Lessons()
         run = Run(seed=seed, goal=goal_of(project), threads=1)
 
@@ -85,8 +85,9 @@ def renders() -> tuple[list[Frame], list[Frame]]:
     return alone, taught
 
 
+@pytest.mark.validation
 def test_a_taught_frame_has_the_light_that_it_has_alone():
-    alone, taught = renders()
+    alone, taught = renders(SEEDS)
     weights = [frame.importance for frame in taught]
     for light in (lambda frame: frame.laser_indirect[0], lambda frame: frame.ambient.mean(axis=2)):
         # where the line is: coarse light elsewhere is interpolated in either
@@ -96,33 +97,36 @@ def test_a_taught_frame_has_the_light_that_it_has_alone():
         assert abs(one.mean() - other.mean()) < 4.0 * spread + 1e-3 * one.mean()
 
 
-def test_a_taught_frame_is_as_well_known_and_tells_so():
-    for frame in renders()[1]:
+@pytest.mark.parametrize("seeds", [1, pytest.param(SEEDS, marks=pytest.mark.validation)])
+def test_a_taught_frame_is_as_well_known_and_tells_so(seeds):
+    for frame in renders(seeds)[1]:
         for one in frame.quality:
             assert one.lines is not None and one.unknown is not None
             assert one.reason != "target" or (one.error <= one.target and one.unknown <= 0.1 * one.lines + 1)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("group", ["direct", "indirect", "ambient"])
 def test_a_taught_frame_is_as_near_its_goal_as_alone(group):
     """Where it ends by its work as where it ends by its goal: by the seeds' own scatter, of which four times the
     standard error of the difference would show twice the error."""
     alone, taught = (
         np.log([one.error / one.target for frame in found for one in frame.quality if one.group == group])
-        for found in renders()
+        for found in renders(SEEDS)
     )
     assert len(alone) == len(taught) == SEEDS
     spread = np.sqrt((alone.var(ddof=1) + taught.var(ddof=1)) / SEEDS)
     assert taught.mean() - alone.mean() < 4.0 * spread < np.log(2.0)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("group", ["direct", "indirect", "ambient"])
 def test_no_more_rows_are_unknown_in_taught_frames_than_in_those_alone(group):
     """By the exact test of two shares (Fisher 1922): frames are independent, rows of one are not, so that it is frames
     with more than a twentieth of their rows unknown that are counted."""
     over = [
         sum(one.unknown > 0.05 * one.lines for frame in found for one in frame.quality if one.group == group)
-        for found in renders()
+        for found in renders(SEEDS)
     ]
     table = [[over[1], SEEDS - over[1]], [over[0], SEEDS - over[0]]]
     assert fisher_exact(table, alternative="greater").pvalue > 0.01
@@ -131,5 +135,5 @@ def test_no_more_rows_are_unknown_in_taught_frames_than_in_those_alone(group):
 def test_passes_of_a_taught_frame_are_numbered_apart():
     """By the same random numbers it would look where these found light by chance."""
     assert TAUGHT > 1000 * LOOKS
-    alone, taught = renders()
+    alone, taught = renders(1)
     assert not np.array_equal(alone[0].laser_indirect[0], taught[0].laser_indirect[0])

@@ -75,6 +75,7 @@ def test_it_ends_at_the_error_asked_for_and_not_much_later():
     assert finer.error <= 0.005 and 1.3 < finer.samples / images[-1].samples < 8.0
 
 
+@pytest.mark.validation
 def test_samples_where_the_variance_is_beat_the_same_number_everywhere():
     # the lamp's light on the wall is smooth; the edges of the box and of its shadow are not
     scene, world = box_on_a_wall(0.1, lights=(LAMP,), environment=Environment())

@@ -13,7 +13,7 @@ from tests.render.ambient.test_ambient_error import box_on_a_wall
 
 
 def test_an_image_that_may_be_off_by_a_twentieth_is_interpolated_and_a_finer_one_sampled():
-    scene, world = box_on_a_wall(0.25)
+    scene, world = box_on_a_wall(0.08)
     placed = PlacedScene(world, scene)
     (image,) = image_light(placed, target=COARSE_ERROR)
     *_, reference = ambient_images(placed, target=0.0, most=512, run=Run(seed=7))

@@ -133,6 +133,7 @@ def moved_lines(shared=True, scale=0.05, seeds=SEEDS):
     return np.array(found), np.array(halves), np.array(told), np.mean(samples)
 
 
+@pytest.mark.validation
 def test_lines_are_moved_by_no_more_than_is_allowed_and_told():
     found, _, told, _ = moved_lines()
     # in the colour that is known worst
@@ -143,6 +144,7 @@ def test_lines_are_moved_by_no_more_than_is_allowed_and_told():
     assert np.sqrt(np.mean(deviation**2)) == pytest.approx(np.sqrt(np.mean(told**2)), rel=0.15)
 
 
+@pytest.mark.validation
 def test_lines_whose_pixels_share_random_numbers_are_where_they_should_be():
     found, halves, _, _ = moved_lines()
     of_mean = found.var(axis=0, ddof=1) / SEEDS + np.mean((halves[0] - halves[1]) ** 2, axis=-1)[:, None] / 4.0

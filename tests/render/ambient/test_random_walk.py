@@ -39,6 +39,7 @@ def test_a_body_that_scatters_nothing_follows_beers_law():
     assert image == pytest.approx(np.exp(-thickness / np.array(free)), rel=0.02, abs=0.005)
 
 
+@pytest.mark.validation
 def test_each_band_is_what_it_would_be_alone():
     ball = moved(primitive_mesh(Sphere(radius=0.1)), (0, 0, 0.8))
     lamp = RectangleLight(width=0.3, height=0.3, T_world_light=Pose(translation=(0.3, -0.2, 0.2), rotation=(0, 0, 0)))

@@ -103,12 +103,13 @@ def test_what_kernels_called_before_answers_python_as_well(program: Path) -> Non
     assert run(program, "print(quotient(1.0, 4.0))\n" + CALL) == ["0.25", "12.0", "6.0"]
 
 
+@pytest.mark.validation
 def test_what_python_called_before_is_taken_from_the_cache_by_a_kernel(program: Path) -> None:
     run(program, "quotient(1.0, 4.0)")
     assert run(program, CALL + "\nprint(sum(quotient.stats.cache_misses.values()))") == ["12.0", "6.0", "0"]
 
 
-@pytest.mark.parametrize("before", ["", CALL])
+@pytest.mark.parametrize("before", [CALL, pytest.param("", marks=pytest.mark.validation)])
 def test_an_error_within_what_a_kernel_calls_is_told_in_its_words(program: Path, before: str) -> None:
     """Also by machine code that was loaded, where what raises it was never compiled."""
     code = f"{before}\ntry:\n    outer(np.zeros(1))\nexcept ZeroDivisionError as error:\n    print(error.args[0])"

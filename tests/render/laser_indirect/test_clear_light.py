@@ -44,6 +44,8 @@ LIT = {
     "a window before the laser": ([WALL, SIDE_WINDOW], [GREY, GLASS]),
     "a mirror in the sheet": ([WALL, MIRROR_STRIP], [GREY, Conductor(roughness=0.0)]),
 }
+QUICK = ("a window before the laser", "a mirror in the sheet", "a mirror behind a window")
+"""Those that random paths bring within seconds."""
 
 
 def of_kinds(task, sampling, camera, passes):
@@ -56,7 +58,9 @@ def of_kinds(task, sampling, camera, passes):
     return np.array(sums)
 
 
-@pytest.mark.parametrize("name", LIT)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.validation) for name in LIT]
+)
 def test_it_is_the_light_that_random_paths_bring(name):
     _, parts = setting(*LIT[name], camera=CAMERAS.get(name, paper_camera(0.05)), laser=BROAD)
     task, sampling, camera = pass_of(parts)
@@ -98,7 +102,7 @@ def test_a_line_through_the_lasers_own_window_lies_and_shines_as_snell_and_fresn
 
 def test_its_error_is_told():
     """Beside eight times as many rays a side, anywhere in the pixels."""
-    _, parts = setting(*LIT["a plate on both ways"], camera=paper_camera(0.1), laser=BROAD)
+    _, parts = setting(*LIT["a plate on both ways"], camera=paper_camera(0.05), laser=BROAD)
     task, _, _ = pass_of(parts)
     light = clear_light(task, Run())
     exact = Integral(task, Run(), []).sampled(light.pixels, 16, jitter=True).sum(axis=1)

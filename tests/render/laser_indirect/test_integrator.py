@@ -294,6 +294,7 @@ def test_a_deep_medium_reflects_as_chandrasekhar_says(albedo):
     assert caught / (paths * beam.power) == pytest.approx(expected, abs=chance + 0.02 * expected)
 
 
+@pytest.mark.validation
 def test_an_aperture_blurs_reflected_light_and_keeps_it():
     from render.camera.camera import Lens
 
@@ -317,7 +318,7 @@ def test_an_aperture_blurs_reflected_light_and_keeps_it():
     assert spread[1] - spread[0] == pytest.approx(disc**2 / 16, rel=0.1)
 
 
-@pytest.mark.parametrize("albedo", [0.5, 0.9])
+@pytest.mark.parametrize("albedo", [0.5, pytest.param(0.9, marks=pytest.mark.validation)])
 def test_an_integrating_sphere_is_evenly_lit_by_all_light_but_the_first(albedo):
     # the first reflection spreads evenly over a sphere; the rest is the series a^2 + a^3 + ...
     ball = primitive_mesh(Sphere(radius=1.0, segments=128))

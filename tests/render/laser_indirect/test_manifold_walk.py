@@ -163,9 +163,12 @@ CAMERAS = {
     )
 }
 """In place of a small pinhole camera."""
+QUICK = ("a plate on both ways", "a mirror behind a window")
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.validation) for name in SCENES]
+)
 def test_walks_bring_the_light_that_merging_brings_with_less_noise(name):
     _, parts = setting(*SCENES[name], camera=CAMERAS.get(name, paper_camera(0.05)))
     merged, _ = chain_light(parts, chains=None)

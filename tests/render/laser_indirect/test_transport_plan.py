@@ -110,6 +110,7 @@ def test_the_same_seen_through_a_window_needs_merging():
     found.pilot_agrees()
 
 
+@pytest.mark.validation
 def test_a_block_of_wax_needs_the_walk_below_its_surface():
     block = moved(primitive_mesh(Box(size_x=0.3, size_y=0.3, size_z=0.1)), (0.0, 0.0, 0.95))
     wax = Subsurface(index=1.45, roughness=0.3, mean_free_path=0.0005, scattering_albedo=0.95)
