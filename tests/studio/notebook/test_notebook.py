@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import doctest
-import os
 import pickle
 import re
-import subprocess
-import sys
+import runpy
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,7 +34,9 @@ def python_block(text: str) -> str:
 
 
 class TestTheSevenLines:
-    def test_they_run_as_the_readme_has_them(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_they_run_as_the_readme_has_them(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quick_reports: None
+    ) -> None:
         """At a small image scale, but for that letter by letter."""
         monkeypatch.chdir(tmp_path)
         lines = python_block((ROOT / "README.md").read_text(encoding="utf-8"))
@@ -89,25 +89,20 @@ class TestTheSevenLines:
             errors.depth_z.rmse, errors.surface.rmse, errors.completeness,
         )  # fmt: skip
 
-    def test_the_example_runs(self, tmp_path: Path) -> None:
+    def test_the_example_runs(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], quick_reports: None
+    ) -> None:
         text = (ROOT / "assets" / "examples" / "first_scan.py").read_text(encoding="utf-8")
         assert text.count("SCALE = 0.2\n") == 1
         (tmp_path / "first_scan.py").write_text(text.replace("SCALE = 0.2\n", "SCALE = 0.05\n"), encoding="utf-8")
-        done = subprocess.run(
-            [sys.executable, "first_scan.py"],
-            cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
-            capture_output=True,
-            text=True,
-            timeout=600,
-        )
-        assert done.returncode == 0, done.stderr
-        assert "PointErrors: depth RMSE" in done.stdout
+        monkeypatch.chdir(tmp_path)
+        runpy.run_path("first_scan.py", run_name="__main__")
+        assert "PointErrors: depth RMSE" in capsys.readouterr().out
         assert (tmp_path / "ball.html").stat().st_size > 10_000
 
     @pytest.mark.parametrize("module", [notebook_frame, notebook_measuring, notebook_report, project_module])
     def test_the_examples_in_the_docstrings(
-        self, module: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+        self, module: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quick_reports: None
     ) -> None:
         monkeypatch.chdir(tmp_path)
         failed, tried = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)  # type: ignore[arg-type]
@@ -239,7 +234,7 @@ class TestChangesAtEachStep:
         assert np.array_equal(blazer.render(read).laser(0), blazer.render(project).laser(0))
         assert blazer.render(project).laser(0).max() > 0.0
 
-    def test_two_lasers_make_one_report_of_lists(self, tmp_path: Path) -> None:
+    def test_two_lasers_make_one_report_of_lists(self, tmp_path: Path, quick_reports: None) -> None:
         project = blazer.Project.load("plane")
         (first,) = project.scene.lasers
         pose = blazer.Pose(translation=(-0.2, 0.0, 0.0), rotation=(0.0, 0.226893, 0.0))

@@ -25,10 +25,9 @@ SCALE = 0.1
 
 
 def quick(template, **more):
-    """A project whose every light takes a moment."""
-    return Project.load(template).replaced(
-        {"render.ambient_samples": 2, "render.transport": "direct", "render.laser_error": 0.05, **more}
-    )
+    """A project whose every light takes a moment, and which asks for no goal of the line."""
+    less = {"render.ambient_samples": 2, "render.transport": "direct", "render.laser_error": 0.05, "render.goal": None}
+    return Project.load(template).replaced(less | more)
 
 
 def window(rendered, now, root, scale, methods, noise=True):
@@ -58,7 +57,7 @@ def assert_same(errors, measurement):
     assert errors.depth_z == measurement.errors.depth_z and np.isfinite(errors.depth_z.rmse)
 
 
-def test_lines_of_a_render_that_was_developed_otherwise_give_the_figures_of_the_window(tmp_path):
+def test_lines_of_a_render_that_was_developed_otherwise_give_the_figures_of_the_window(tmp_path, quick_reports):
     file = new_project("sphere", tmp_path / "here").project
     saved = Project.load(file)
     rendered = quick(
@@ -91,7 +90,7 @@ def test_lines_of_a_render_that_was_developed_otherwise_give_the_figures_of_the_
 
 
 def test_lines_for_several_lasers_and_no_noise_are_lists(tmp_path):
-    plane = quick("plane")
+    plane = quick("plane", **{"render.goal": Project.load("plane").render.goal})
     second = plane.scene.lasers[0].model_copy(update={"name": "other", "power": 0.01})
     both = plane.replaced({"scene.rig.lasers": [plane.scene.lasers[0], second]})
     measured = window(both, both, template_folder("plane"), SCALE, ("likelihood",), noise=False)
@@ -117,7 +116,7 @@ def test_any_project_is_made_of_any_other():
             assert before.replaced(found) == now and (bool(found) == (before != now))
 
 
-def test_lines_of_a_scan_run_it_again(tmp_path):
+def test_lines_of_a_scan_run_it_again(tmp_path, quick_reports):
     root = template_folder("scan")
     first = run_scan(
         quick("scan", **{"scene.motion.steps": 2}), root, out=tmp_path / "out", options=ScanOptions(image_scale=SCALE)

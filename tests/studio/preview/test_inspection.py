@@ -16,6 +16,7 @@ from render.scene.scene import SceneObject
 from render.scene.shape import Plane
 from studio.photographs.image_files import load_photograph
 from studio.preview.inspection import Inspection, inspect, working_range
+from studio.project.document import replaced
 from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.scan.options import ScanOptions
@@ -29,7 +30,7 @@ BASELINE, TILT, DEPTH, FOCAL = 0.2, 0.226893, 0.8663, 3478.26
 @pytest.fixture(scope="module")
 def facing() -> Project:
     """The paper's rig over a plane that faces it, at the depth where the sheet crosses the camera's axis."""
-    project = Project.load(ROOT / "project.json")
+    project = replaced(Project.load(ROOT / "project.json"), ("render", "goal"), None)
     plane = SceneObject(name="plane", shape=Plane(width=0.5, height=0.4))
     scene = project.scene.model_copy(update={"objects": (plane,), "lights": (), "environment": Environment()})
     return project.model_copy(update={"scene": scene})

@@ -249,14 +249,16 @@ def test_a_render_in_a_job_is_cancelled_in_the_middle_of_a_pass() -> None:
     from render.progressive import refine
     from render.world.world import build_world
     from studio.project.templates import template_folder
+    from studio.scan.stages import scaled
 
     folder: Path = template_folder("sphere")
-    project = Project.load(folder / "project.json")
+    project = scaled(Project.load(folder / "project.json"), 0.25)
     world = build_world(project.scene, folder)
     frames = []
 
     def work(progress: Progress, cancelled: Cancel) -> None:
-        settings = project.render.model_copy(update={"ambient_samples": 4096, "ambient_error": 2e-4})
+        endless = {"ambient_samples": 65536, "ambient_error": 2e-4, "goal": None}
+        settings = project.render.model_copy(update=endless)
         for frame in refine(world, project.scene, settings=settings, progress=progress, run=Run(cancelled=cancelled)):
             frames.append(frame)
 

@@ -23,8 +23,8 @@ from studio.scan.reconstruct import reconstruct_folder
 from studio.scan.stages import Clock
 from tests.studio.small_scan import contents, scan, small_project
 
-EACH = pytest.mark.parametrize("each", [3, pytest.param(1, marks=pytest.mark.validation)])
-"""Killed at every third operation, or at every one, which takes minutes."""
+EACH = pytest.mark.parametrize("each", [8, pytest.param(1, marks=pytest.mark.validation)])
+"""Killed at every eighth operation, or at every one, which takes minutes."""
 
 
 class Killed(BaseException):

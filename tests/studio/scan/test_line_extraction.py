@@ -12,6 +12,7 @@ from render.base.errors import InputError
 from render.scene.motion import LinearStage
 from render.world.world import build_world
 from studio.project.allowed_files import of_command_line
+from studio.project.document import replaced
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.scan.line_extraction import extract_line, extraction_of, working_volume
@@ -30,7 +31,7 @@ def with_extraction(project: Project, **changes: object) -> Project:
 
 @pytest.fixture(scope="module")
 def rendered():
-    project = scaled(Project.load(ROOT / "project.json"), 0.5)
+    project = replaced(scaled(Project.load(ROOT / "project.json"), 0.5), ("render", "goal"), None)
     world = build_world(project.scene, ROOT, 0)
     return project, world, render_step(project, world, 0, CLOCK)
 
@@ -79,7 +80,7 @@ def test_fused_exposures_measure_a_line_that_one_exposure_saturates(rendered):
 
 def test_the_working_volume_of_the_project_decides_what_is_measured():
     root = template_folder("sphere")
-    project = scaled(Project.load(root / "project.json"), 0.25)
+    project = replaced(scaled(Project.load(root / "project.json"), 0.25), ("render", "goal"), None)
     frame = render_step(project, build_world(project.scene, root, 0), 0, CLOCK)
     image = develop_step(project, frame, CLOCK, None)[0]
     whole = extract_line(project, image, 0)

@@ -30,7 +30,7 @@ from studio.scan.stages import Clock, render_step, scaled
 
 ROOT = template_folder("scan")
 SCALE = 0.06
-FRAMES = 60
+FRAMES = 24
 
 
 @pytest.fixture(scope="module")
@@ -128,13 +128,13 @@ def test_where_no_frame_is_kept_other_methods_measure_those_alone_that_the_repor
     """Evenly spread; the project's own method measures all, the same as ever."""
     found = {}
     for frames in ("all", "none"):
-        options = ScanOptions(image_scale=SCALE, steps=40, frames=frames, report=False)
+        options = ScanOptions(image_scale=SCALE, steps=24, frames=frames, report=False)
         found[frames] = run_scan(project, ROOT, out=tmp_path / frames, options=options).manifest
     (own, *others), (same, *fewer) = (found[frames]["results"] for frames in ("all", "none"))
     assert same == own and [one["method"] for one in fewer] == [one["method"] for one in others] != []
     for one, of_all in zip(fewer, others, strict=True):
         assert one["scan_lines"] == of_all["scan_lines"]  # of the scan, whoever measured them
-        assert one["points"] == pytest.approx(16 / 40 * of_all["points"], rel=0.05)
+        assert one["points"] == pytest.approx(16 / 24 * of_all["points"], rel=0.05)
         assert one["completeness"] == pytest.approx(of_all["completeness"], rel=0.05)
-    told = "Other methods, to compare with, measured 16 of 40 frames."
+    told = "Other methods, to compare with, measured 16 of 24 frames."
     assert told in found["none"]["extraction"] and told not in found["all"]["extraction"]

@@ -33,9 +33,9 @@ def template(name: str) -> Project:
 
 
 def still(name: str) -> Project:
-    """A template at a small size without its costly truth images and ambient light."""
+    """A template at a small size without its costly truth images, ambient light and goal."""
     project = template(name)
-    render = project.render.model_copy(update={"truth_images": False})
+    render = project.render.model_copy(update={"truth_images": False, "goal": None})
     dark = project.scene.environment.model_copy(update={"radiance": (0.0, 0.0, 0.0)})
     scene = project.scene.model_copy(update={"lights": (), "environment": dark})
     return project.model_copy(update={"render": render, "scene": scene})
