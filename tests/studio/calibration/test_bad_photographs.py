@@ -113,6 +113,7 @@ def test_a_board_that_was_counted_wrongly_is_told_as_it_is(said: tuple[int, int]
         detect(grey(good / "pose_00_off.png"), Board("checkerboard", *said, 0.04), "image")
 
 
+@pytest.mark.validation
 def test_where_no_line_is_left_the_reason_is_told(good: Path, tmp_path: Path) -> None:
     for file in good.glob("pose_0[0-4]_*.png"):
         (tmp_path / file.name.replace("png", "jpg")).write_bytes(cv2.imencode(".jpg", grey(file), [1, 40])[1].tobytes())

@@ -67,7 +67,9 @@ def rendered(board: Board, there: Estimate, folder: Path) -> np.ndarray:
     return np.asarray(image)
 
 
-@pytest.mark.parametrize("board", [DISCS, MARKED], ids=["discs", "squares with a marker"])
+@pytest.mark.parametrize(
+    "board", [pytest.param(DISCS, marks=pytest.mark.validation), MARKED], ids=["discs", "squares with a marker"]
+)
 def test_a_rendered_board_is_found_where_the_camera_sees_it(board: Board, tmp_path: Path) -> None:
     there = scene(30.0)
     view, _ = detect(rendered(board, there, tmp_path), board, "image")
