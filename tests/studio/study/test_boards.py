@@ -54,6 +54,7 @@ def test_an_error_of_the_calibration_is_the_error_of_the_points() -> None:
     assert 0.2 * row["calibration_rmse"] < abs(row["depth_bias"]) < 5.0 * row["calibration_rmse"]
 
 
+@pytest.mark.validation
 def test_the_noise_of_corners_is_the_reprojection_error_and_depth_is_known_as_well_as_is_told() -> None:
     found = [calibrated(Project.load("plane").model_copy(update={"seed": seed}), Boards(), 0) for seed in range(8)]
     # 20 views of 117 corners, two coordinates of 0.05 px each, less some 125 parameters of 4,680

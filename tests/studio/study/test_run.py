@@ -14,7 +14,9 @@ from typing import Any
 
 import pyarrow.parquet
 import pytest
+from click.testing import CliRunner
 
+import main
 import studio.runtime.workers
 from render.base.errors import Cancelled, InputError
 from studio.runtime.workers import Engine
@@ -125,6 +127,7 @@ def test_a_study_that_is_stopped_anywhere_goes_on_to_the_same_table(whole: tuple
     assert again == whole[1] and stops > 2
 
 
+@pytest.mark.validation
 def test_three_shards_merged_give_the_same_table(whole: tuple[Path, bytes], tmp_path: Path) -> None:
     chosen = study()
     digest = chosen.digest(chosen.bases(tmp_path))
@@ -238,14 +241,12 @@ def test_a_disk_without_room_for_the_study_is_told_before_anything_runs(
     assert not out.exists()
 
 
-def command(*words: object) -> list[str]:
-    return [sys.executable, str(ROOT / "main.py"), "study", *map(str, words)]
-
-
+@pytest.mark.validation
 def test_a_killed_study_goes_on_with_nothing_lost_or_done_twice(whole: tuple[Path, bytes], tmp_path: Path) -> None:
     file, out = tmp_path / "study.json", tmp_path / "out"
     file.write_text(json.dumps(DATA))
-    run_it = command("run", file, "--out", out, "--workers", "2", "--json")
+    words = ("study", "run", str(file), "--out", str(out), "--workers", "2", "--json")
+    run_it = [sys.executable, str(ROOT / "main.py"), *words]
     process = subprocess.Popen(run_it, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     chosen = study()
     deadline = time.monotonic() + 300.0
@@ -265,13 +266,13 @@ def test_a_killed_study_goes_on_with_nothing_lost_or_done_twice(whole: tuple[Pat
 
 
 def test_show_tells_what_a_folder_holds(whole: tuple[Path, bytes]) -> None:
-    done = subprocess.run(command("show", whole[0]), capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0 and "beyond, starved" in " ".join(done.stdout.split())
+    done = CliRunner().invoke(main.cli, ["study", "show", str(whole[0])])
+    assert done.exit_code == 0 and "beyond, starved" in " ".join(done.stdout.split())
 
 
 def test_a_folder_without_a_study_is_told(tmp_path: Path) -> None:
-    done = subprocess.run(command("show", tmp_path), capture_output=True, text=True, timeout=300)
-    assert done.returncode == 2 and "the folder holds no study" in done.stderr
+    done = CliRunner().invoke(main.cli, ["study", "show", str(tmp_path)])
+    assert done.exit_code == 2 and "the folder holds no study" in done.stderr
 
 
 def test_a_render_under_way_is_given_up_where_the_study_is_stopped(tmp_path: Path) -> None:
