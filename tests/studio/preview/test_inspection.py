@@ -24,6 +24,8 @@ from studio.scan.scan import run_scan
 from studio.scan.stages import scaled
 
 ROOT = template_folder("plane")
+LONG = ("weld_seam", "glass_ball")
+"""Templates whose light takes ten seconds and more."""
 BASELINE, TILT, DEPTH, FOCAL = 0.2, 0.226893, 0.8663, 3478.26
 
 
@@ -135,7 +137,9 @@ def test_nothing_in_view_is_refused(facing: Project) -> None:
         inspect(facing.model_copy(update={"scene": scene}), ROOT)
 
 
-@pytest.mark.parametrize("template", DESCRIPTIONS)
+@pytest.mark.parametrize(
+    "template", [pytest.param(name, marks=pytest.mark.validation if name in LONG else []) for name in DESCRIPTIONS]
+)
 def test_every_template_is_exposed_well_and_can_be_told_in_json(template: str) -> None:
     folder = template_folder(template)
     view = inspect(Project.load(folder / "project.json"), folder)

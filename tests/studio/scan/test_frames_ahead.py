@@ -67,7 +67,7 @@ def test_blocks_are_of_one_length_and_no_longer_than_they_may_be() -> None:
         assert np.all(lengths[:-1] == lengths.max())
 
 
-@pytest.mark.parametrize("threads", [2, 5])
+@pytest.mark.parametrize("threads", [5, pytest.param(2, marks=pytest.mark.validation)])
 def test_frames_are_the_same_on_any_number_of_threads(
     project: Project, alone: list[bytes], threads: int, tmp_path: Path
 ) -> None:
@@ -78,6 +78,7 @@ def test_a_scan_cut_short_has_the_frames_of_the_whole(project: Project, alone: l
     assert scanned(project, tmp_path, threads=2, steps=5) == alone[:5]
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("missing", [[1, 2, 3], [6]])
 def test_frames_rendered_anew_are_as_they_were(
     project: Project, alone: list[bytes], missing: list[int], tmp_path: Path

@@ -73,12 +73,19 @@ print(json.dumps({"late": late, "kernels": len(read())}))
 """
 
 
-def test_nothing_is_compiled_or_loaded_after_the_warm_up(tmp_path):
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("scan", "sphere"),
+        pytest.param(("scan", "weld_seam", "shiny_weld_seam", "glass_ball", "sphere"), marks=pytest.mark.validation),
+    ],
+    ids=["a moving rig and a lens that blurs", "all kinds"],
+)
+def test_nothing_is_compiled_or_loaded_after_the_warm_up(tmp_path, names):
     """No kernel of render and analysis, whatever its name, meets types in a scan that the warm-up has not shown it.
 
     Nor does the process beside the first one compile any that this has no use for.
     """
-    names = ("scan", "weld_seam", "shiny_weld_seam", "glass_ball", "sphere")
     done = subprocess.run(
         [sys.executable, "-c", CHILD, str(tmp_path), *(str(template_folder(name)) for name in names)],
         env={**os.environ, "PYTHONPATH": str(ROOT)},

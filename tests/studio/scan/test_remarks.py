@@ -20,6 +20,8 @@ from studio.scan.remarks import best, frame_remarks, frame_result, scale_head, s
 from studio.scan.speckle_remark import speckle_remark
 from studio.scan.stages import Clock, develop_step, measure_step, render_step, scaled
 
+DIRECT = {"ambient_samples": 1, "transport": "direct", "goal": None}
+
 
 def test_figures_at_another_scale_are_said_not_to_be_the_scanners() -> None:
     assert scale_notes(1.0) == () and scale_head(1.0) == ""
@@ -53,7 +55,7 @@ def test_without_a_measurement_there_is_nothing_to_remark() -> None:
 def test_speckle_that_the_sensor_leaves_out_is_told_with_its_size() -> None:
     folder = template_folder("plane")
     project = Project.load(folder / "project.json")
-    direct = project.render.model_copy(update={"ambient_samples": 1, "transport": "direct", "truth_images": False})
+    direct = project.render.model_copy(update=DIRECT | {"truth_images": False})
     project = project.model_copy(update={"render": direct})
     world, clock = build_world(project.scene, folder, 0), Clock(lambda *_: None, lambda: False)
     frame = render_step(project, world, 0, clock)
@@ -69,11 +71,12 @@ def test_speckle_that_the_sensor_leaves_out_is_told_with_its_size() -> None:
     assert foretold == pytest.approx(scatter["polarised"], rel=0.1) and foretold > 3.0 * scatter["off"]
 
 
+@pytest.mark.validation
 def test_blur_that_the_image_leaves_out_is_told_with_its_size() -> None:
     """A disc of diameter D has a sigma of D / 4 across the line."""
     folder = template_folder("plane")
     project = Project.load(folder / "project.json")
-    direct = project.render.model_copy(update={"ambient_samples": 1, "transport": "direct", "truth_images": True})
+    direct = project.render.model_copy(update=DIRECT)
     project = project.model_copy(update={"render": direct})
     lens = ("scene", "rig", "camera", "lens", "focus_distance")
     world, clock = build_world(project.scene, folder, 0), Clock(lambda *_: None, lambda: False)

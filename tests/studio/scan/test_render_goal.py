@@ -123,6 +123,7 @@ def test_a_line_that_is_not_the_lasers_is_known_to_a_share_of_its_width(frame: F
     assert np.all(ratio < 0.5) and np.median(ratio / told) == pytest.approx(1.0, rel=0.1)
 
 
+@pytest.mark.validation
 def test_the_goal_is_reached_in_nineteen_rows_of_twenty(world: World) -> None:
     """Rendered with other seeds, the reflections put each row elsewhere, on average over the sensor's noise: by less
     than the goal.
