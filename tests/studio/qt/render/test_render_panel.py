@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QLineEdit
 
 from render.render import render_world
 from render.run import Run
-from render.scene.settings import RenderSettings
+from render.scene.settings import DepthGoal, RenderSettings
 from studio.qt.core.jobs import JobRunner
 from studio.qt.image.compare_view import DIFFERENCE
 from studio.qt.render.develop_panel import DevelopPanel
@@ -59,11 +59,12 @@ def long_render(qtbot, panel):
 
 def test_the_image_refines_until_it_is_the_final_one(qtbot, panel):
     session, seen = panel.session, []
+    session.set(("render", "goal"), DepthGoal())
     session.renders_changed.connect(lambda: seen.append((len(session.renders), session.shown.final)))
     press(qtbot, panel.start_button)
     finish(qtbot, panel)
     assert seen[0] == (1, False) and seen[-1] == (1, True) and len(seen) >= 5
-    project = small_project()
+    project = session.project
     world, _ = small_render()
     run = Run(seed=project.seed, goal=goal_of(project))
     whole = render_world(world, project.scene, settings=project.render, run=run)
@@ -299,6 +300,7 @@ def test_what_inspect_warns_of_is_told_once_as_it_is_measured(qtbot, panel):
 
 def test_the_goal_is_the_line_or_the_errors_of_the_image(panel: RenderPanel) -> None:
     session = panel.session
+    session.set(("render", "goal"), DepthGoal())
     assert panel.goal.value() == 0.1 and not panel.ambient_error.isEnabled()
     panel.goal.setValue(0.0)
     assert session.project.render.goal is None and panel.goal.text() == "errors of the image"

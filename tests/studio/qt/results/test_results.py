@@ -34,7 +34,7 @@ def render(tmp_path_factory: pytest.TempPathFactory) -> Render:
 
     folder = template_folder("step_block")
     project = scaled(Project.load(folder / "project.json"), 0.1)
-    settings = project.render.model_copy(update={"ambient_samples": 1, "laser_error": 0.05})
+    settings = project.render.model_copy(update={"ambient_samples": 1, "laser_error": 0.05, "goal": None})
     project = project.model_copy(update={"render": settings})
     clock = Clock(lambda *_: None, lambda: False)
     world = build_world(project.scene, folder, 0)

@@ -245,7 +245,7 @@ def test_the_cheat_sheet_fits_its_screen(
     assert screen[0] < 1280 or sheet.size() == page
 
 
-@pytest.mark.parametrize("kept", [False, True])
+@pytest.mark.parametrize("kept", [True, pytest.param(False, marks=pytest.mark.validation)])
 @pytest.mark.parametrize(("screen", "maximized"), [(QSize(1366, 768), True), (QSize(1920, 1200), False)])
 def test_a_window_fits_its_screen_where_nothing_of_an_earlier_one_is_restored(
     screen: QSize, maximized: bool, kept: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

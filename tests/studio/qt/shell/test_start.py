@@ -91,7 +91,9 @@ def opened(home: Path, *arguments: str, cwd: Path | None = None, visit: str = ""
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="file names are bytes there")
-@pytest.mark.parametrize("given", ["path", "relative", "folder alone"])
+@pytest.mark.parametrize(
+    "given", ["path", *(pytest.param(how, marks=pytest.mark.validation) for how in ("relative", "folder alone"))]
+)
 def test_in_a_folder_whose_name_is_not_text(home: Path, given: str) -> None:
     folder = Path(os.fsdecode(os.fsencode(home) + b"/\xff"))
     new_project("plane", folder)

@@ -171,10 +171,9 @@ def test_change_the_exposure_without_rendering_again(window: MainWindow, qtbot: 
 
 
 def test_export_report_points_and_image(
-    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quick_reports: None
 ) -> None:
     render(window, qtbot)
-    monkeypatch.setattr("analysis.report.picture.TIME_LIMIT", 180.0)
     for key, name in (("export_html", "report.html"), ("export_csv", "points.csv"), ("export_png", "image.png")):
         path = tmp_path / "out" / name
         monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, path=path, **__: (str(path), ""))

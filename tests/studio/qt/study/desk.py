@@ -29,7 +29,8 @@ class Desk:
 
     def __init__(self, folder: Path) -> None:
         project = Project.load(template_folder("plane"))
-        settings = project.render.model_copy(update={"ambient_samples": 1, "laser_error": 0.05, "transport": "direct"})
+        least = {"ambient_samples": 1, "laser_error": 0.05, "transport": "direct", "goal": None}
+        settings = project.render.model_copy(update=least)
         file = folder / "plane.json"
         project.model_copy(update={"render": settings}).save(file)
         self.session = Session(Document(Project.load(file), file))
