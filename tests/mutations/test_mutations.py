@@ -16,6 +16,8 @@ FEW = 75
 MANY = int(os.environ.get("MUTATIONS", 10_000))
 """Cases under `make validate`."""
 SHOWN = 20
+LONG = ("report", "option")
+"""Kinds whose cases take seconds each."""
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +34,9 @@ def test_whole_input_is_accepted(runner: Runner, kind: str) -> None:
     assert verdict.code == 0 and not verdict.faults, str(verdict)
 
 
-@pytest.mark.parametrize("kind", WEIGHTS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=pytest.mark.validation if kind in LONG else []) for kind in WEIGHTS]
+)
 def test_a_case_is_the_same_every_time(runner: Runner, kind: str) -> None:
     first, again = (runner.run(kind, 3) for _ in range(2))
     assert (first.command, first.code, first.faults) == (again.command, again.code, again.faults)

@@ -43,7 +43,7 @@ def photograph(board: Board, turn: float, blur: float = 0.8) -> tuple[np.ndarray
     return image, cv2.perspectiveTransform(corners[None], place)[0]
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.3])
+@pytest.mark.parametrize("turn", [0.3, pytest.param(0.0, marks=pytest.mark.validation)])
 def test_corners_err_as_their_covariance_says(turn: float) -> None:
     exact, truth = photograph(CHECKERS, turn)
     rng, chi2, errors = np.random.default_rng(1), [], []

@@ -81,7 +81,7 @@ def test_a_narrow_line_is_moved_as_by_differences(brightness: float, monkeypatch
     assert np.quantile(apart / total, 0.9) < 0.05 and np.median(apart / total) < 0.02
 
 
-@pytest.mark.parametrize("sigma", [0.3, 0.7, SIGMA])
+@pytest.mark.parametrize("sigma", [0.3, pytest.param(0.7, marks=pytest.mark.validation), SIGMA])
 def test_all_pixels_that_the_fit_looks_at_have_influence(sigma: float) -> None:
     """A fit keeps the window of its seed, which is wider than a narrow line."""
     image, chosen = image_of(PLACES, sigma), settings("likelihood")

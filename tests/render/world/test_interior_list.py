@@ -163,7 +163,9 @@ def meshes_of(world, count):
     return [Mesh(world.vertices, world.triangles[world.object_id == item]) for item in range(count)]
 
 
-@pytest.mark.parametrize("hidden", [Glass(index=1.2), Subsurface(mean_free_path=0.001)])
+@pytest.mark.parametrize(
+    "hidden", [pytest.param(Glass(index=1.2), marks=pytest.mark.validation), Subsurface(mean_free_path=0.001)]
+)
 def test_what_is_hidden_within_a_body_changes_nothing(hidden):
     """Connections and shadow rays cross the hidden boundary too: rough glass, whose inner faces see each other."""
     block = moved(primitive_mesh(Box(size_x=0.2, size_y=0.2, size_z=0.1)), (0.05, 0.0, 0.8))
