@@ -157,7 +157,7 @@ def cases() -> list[Any]:
             where = ".".join(map(str, path))
             for value in (low, high):
                 if not (path[-1] in HEAVY and value > 1000):  # allowed, but more work than a test may take
-                    marks = [] if len(found) % 4 == 0 else [pytest.mark.validation]
+                    marks = [] if len(found) % 12 == 0 else [pytest.mark.validation]
                     found.append(pytest.param(name, path, value, id=f"{name}-{where}-{value:g}", marks=marks))
     return found
 
@@ -184,7 +184,7 @@ def test_at_its_limit_every_number_gives_finite_figures_or_is_refused(
 
 
 @pytest.mark.parametrize(
-    "number", [pytest.param(n, marks=[] if n < 60 else pytest.mark.validation) for n in range(400)]
+    "number", [pytest.param(n, marks=[] if n < 20 else pytest.mark.validation) for n in range(400)]
 )
 def test_several_numbers_at_their_limits_give_finite_figures_or_are_refused(number: int, tmp_path: Path) -> None:
     random = np.random.default_rng(number)
