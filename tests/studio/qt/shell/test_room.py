@@ -37,6 +37,7 @@ from tests.studio.qt.conftest import new_window
 from tests.studio.qt.small_session import FOLDER, small_project, small_render
 
 SCREENS = {"1366 x 768": (1366, 768), "1920 x 1200 at 1.5": (1280, 800), "1366 x 768 at 1.5": (911, 512)}
+SMALLEST = "1366 x 768 at 1.5"
 ITEMS: tuple[FieldPath, ...] = (
     ("scene", "rig", "lasers", 0),
     ("scene", "rig", "camera"),
@@ -151,34 +152,36 @@ def calibrate_virtual_boards(window: MainWindow, qtbot: QtBot) -> None:
     work.tell("What cannot be done is told in as many lines as it takes: " + "a long reason, " * 5)
 
 
-def test_no_text_of_any_panel_is_cut_off(window: MainWindow, qtbot: QtBot) -> None:
-    before = window.size()
+@pytest.mark.parametrize(
+    "screen", [SMALLEST, *(pytest.param(name, marks=pytest.mark.validation) for name in SCREENS if name != SMALLEST)]
+)
+def test_no_text_of_any_panel_is_cut_off(window: MainWindow, qtbot: QtBot, screen: str) -> None:
+    before, (width, height) = window.size(), SCREENS[screen]
     found: dict[object, list[str]] = {}
     open_measured(window, qtbot)
     calibrate_virtual_boards(window, qtbot)
-    for name, (width, height) in SCREENS.items():
-        for each in WORKSPACES:
-            window.switch_to(each.key)
-            window.rearrange()
-            window.resize(width, height - BAR)
-            items = ITEMS if each.key == "setup" else ITEMS[:1]
-            if each.key == "measure":  # the render is of another scene from here on, which is told
-                window.session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.5, "fan angle")
-            for item, extra in [
-                *((item, ()) for item in items),
-                (ITEMS[0], ("motion", "log")),
-                (ITEMS[0], ("nominal",)),
-            ]:
-                window.session.select(item)
-                for key in extra:
-                    window.show_panel(key)
-                for _ in range(3):
-                    QApplication.processEvents()
-                assert window.width() <= width and window.height() <= height, f"{each.key} is larger than {name}"
-                cut = cut_off(window)
-                if cut:
-                    found[name, each.key, item, extra] = cut
-            window.rearrange()
+    for each in WORKSPACES:
+        window.switch_to(each.key)
+        window.rearrange()
+        window.resize(width, height - BAR)
+        items = ITEMS if each.key == "setup" else ITEMS[:1]
+        if each.key == "measure":  # the render is of another scene from here on, which is told
+            window.session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.5, "fan angle")
+        for item, extra in [
+            *((item, ()) for item in items),
+            (ITEMS[0], ("motion", "log")),
+            (ITEMS[0], ("nominal",)),
+        ]:
+            window.session.select(item)
+            for key in extra:
+                window.show_panel(key)
+            for _ in range(3):
+                QApplication.processEvents()
+            assert window.width() <= width and window.height() <= height, f"{each.key} is larger than {screen}"
+            cut = cut_off(window)
+            if cut:
+                found[each.key, item, extra] = cut
+        window.rearrange()
     window.resize(before)
     assert not found, "\n".join(f"{where}: {text}" for where, texts in found.items() for text in texts)
 
