@@ -41,6 +41,8 @@ class PartDrawing(QObject):
         super().__init__(parent)
         self.plot = plot
         self.spans: list[plots.Span] = []
+        self.locked = True
+        """Regions are drawn but not to be moved, and a drag is the plot's."""
         self._items: list[Any] = []
         self._made_for: tuple[Kind | None, str] = None, ""
 
@@ -63,7 +65,7 @@ class PartDrawing(QObject):
                 self._text(f"{one.gauge.name}: {value_text(one.value, one.sigma, one.gauge.unit)}", at, colour)
 
     def show_regions(self, kind: Kind | None, regions: Sequence[tuple[float, float]] = ()) -> None:
-        """Of one measure, as many as there are yet; their edges can be moved once all are there. None: of none."""
+        """Of one measure, as many as there are yet; once all are there they move, unless `locked`. None: of none."""
         colour = theme.colours().accent
         if (kind, colour) != self._made_for:
             for span in self.spans:
@@ -76,7 +78,7 @@ class PartDrawing(QObject):
                 span.edges_moved.connect(partial(self._tell, self.moved))
             self._made_for = kind, colour
         for span in self.spans:
-            span.setMovable(len(regions) == len(self.spans))
+            span.setMovable(len(regions) == len(self.spans) and not self.locked)
         for span, (low, high) in zip(self.spans, regions, strict=False):
             span.place(1e3 * low, 1e3 * high)
         for span in self.spans[len(regions) :]:

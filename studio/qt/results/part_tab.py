@@ -6,7 +6,7 @@ import math
 from functools import partial
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QHideEvent, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -90,6 +90,19 @@ class PartTab(QWidget):
         session.project_changed.connect(self._project_changed)
         session.document_replaced.connect(self.cancel)
         self.placing_changed.connect(lambda: setattr(profile, "held", self.placing is not None))
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._lock(False)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self._lock(True)
+
+    def _lock(self, locked: bool) -> None:
+        """A region is moved only where its measure is seen, so that no drag that means something else changes it."""
+        self.drawing.locked = locked
+        self._show_regions()
 
     def follow(self, laser: int) -> None:
         """Another frame, measurement or laser is shown."""
