@@ -79,23 +79,34 @@ def beside_nominal(gauge: Gauge) -> str:
 def cells(row: Mapping[str, Any]) -> list[str]:
     """Of COLUMNS, from an entry of the scan's record of measures."""
     unit, ratio = row["unit"], row["error_in_sigmas"]
-    verdict = "not measured" if row["reason"] else verdict_text(row["verdict"], row.get("oblique"))
-    if row["readings"] > 1 and not row["reason"]:
-        counts = row.get("verdicts") or {}
-        verdict += f": {counts_text(counts)}" if set(counts) - {"no tolerance"} else ""
-        verdict += f", worst{' measured' if 'none' in counts else ''}: step {row['step'] + 1} of {row['readings']}"
-    elif row["readings"] > 1:
-        verdict += f" in any of {row['readings']} steps"
+    verdict, worst = verdict_of(row), worst_of(row)
     return [
         TITLES[row["kind"]],
         value_text(row["value"], row["sigma"], unit),
         small_text(row["sigma"], unit),
         value_text(row["nominal"], row["sigma"], unit),
         tolerance_text(row["lower"], row["upper"], unit),
-        verdict,
+        f"{verdict}, {worst}" if worst else verdict,
         small_text(row["error"], unit),
         NONE if ratio is None else f"{ratio:+.2f}",
     ]
+
+
+def verdict_of(row: Mapping[str, Any]) -> str:
+    """Of such an entry, with how many of its steps came to what."""
+    steps, counts = row["readings"], row.get("verdicts") or {}
+    if row["reason"]:
+        return f"not measured in any of {steps} steps" if steps > 1 else "not measured"
+    told = verdict_text(row["verdict"], row.get("oblique"))
+    return f"{told}: {counts_text(counts)}" if steps > 1 and set(counts) - {"no tolerance"} else told
+
+
+def worst_of(row: Mapping[str, Any]) -> str:
+    """Which of its steps such an entry has its value of; empty: there is one step, or no value."""
+    if row["reason"] or row["readings"] <= 1:
+        return ""
+    measured = " measured" if "none" in (row.get("verdicts") or {}) else ""
+    return f"worst{measured}: step {row['step'] + 1} of {row['readings']}"
 
 
 def verdict_text(verdict: str | None, oblique: float | None = None) -> str:

@@ -7,6 +7,7 @@ import io
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +137,12 @@ def measures_record(gauges: Sequence[Gauge], found: Sequence[Reading]) -> list[d
     return rows
 
 
+def judged_over_steps(gauge: Gauge, found: Sequence[Reading]) -> dict[str, Any]:
+    """The entry of `measures_record` by the tolerance of a gauge that reads as that of the readings."""
+    (row,) = measures_record((gauge,), [replace(one, gauge=gauge) for one in found])
+    return row
+
+
 def verdict_counts(gauge: Gauge, found: Iterable[Reading]) -> dict[str, int]:
     """How many readings come to which verdict by the tolerance of a gauge that reads as theirs; none: not measured."""
     told = ("none" if one.reason else gauge.verdict(one.value, one.sigma) or "no tolerance" for one in found)
@@ -156,8 +163,12 @@ def step_readings(path: Path, scanned: Sequence[Gauge]) -> dict[Gauge, list[Read
     for row in rows:
         if (gauge := by_name.get(row.get("name") or "")) is not None:
             value, random, systematic = (_typed(row.get(name)) for name in FIGURES[:3])
+            truth, points, step = (_typed(row.get(name)) for name in ("truth", "points", "step"))
+            step = step if math.isfinite(step) else len(found[gauge])
             reason = row.get("reason") or ("" if math.isfinite(value) else "the table has no value")
-            found[gauge].append(Reading(gauge, None, value, random, systematic, reason=reason))
+            used, remark = int(np.nan_to_num(points)), row.get("remark") or ""
+            read_as = (value, random, systematic, used, truth, reason, remark)
+            found[gauge].append(Reading(gauge, int(step), *read_as))
     return found
 
 

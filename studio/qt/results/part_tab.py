@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
+from typing import Any
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QHideEvent, QShowEvent
@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import DEFINITIONS, beside_nominal, counts_text, small_text, value_text, verdict_text
+from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, value_text, verdict_of
 from analysis.report.units import NONE
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.delete_key import DeleteKey
@@ -31,10 +31,11 @@ from studio.qt.core.widgets import keep_room, text_button
 from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.part_drawing import PartDrawing, verdict_colour
 from studio.qt.results.part_editor import PartEditor
+from studio.qt.results.part_steps import PartSteps
 from studio.qt.results.results_profile import ProfilePlot
-from studio.scan.gauging import OF_SCAN, kept_readings, profiles, read_each, step_readings, verdict_counts
+from studio.qt.results.scan_bar import ScanBar
+from studio.scan.gauging import OF_SCAN, judged_over_steps, kept_readings, profiles, read_each
 from studio.scan.remarks import best
-from studio.scan.scan_results import ScanResults
 from studio.scan.sheet_lean import SECTIONS, lean_text
 
 SECTION_TIP = (
@@ -42,7 +43,6 @@ SECTION_TIP = (
     "are longer where it leans; or a section across a direction along which the part is the same, where it is as drawn"
 )
 HEADINGS = ("Name", "Value", "Sigma", "Error", "Verdict")
-AGAIN = "Measure > Measure the scan again"
 NONE_YET = "Add a measure and drag its regions in the profile or the row charts."
 
 
@@ -52,7 +52,8 @@ class PartTab(QWidget):
     placing_changed = Signal()
     """`placing` is another kind, or none."""
 
-    def __init__(self, session: Session, profile: ProfilePlot) -> None:
+    def __init__(self, session: Session, profile: ProfilePlot, scan_bar: ScanBar) -> None:
+        """scan_bar: whether the figures are of all steps."""
         super().__init__()
         self.session = session
         self.laser = 0
@@ -63,8 +64,9 @@ class PartTab(QWidget):
         """Of the project's measures."""
         self.readings: tuple[Reading, ...] = ()
         self._profiles: dict[int, tuple[Profile, Profile]] = {}
-        self._steps: tuple[ScanResults, dict[Gauge, list[Reading]]] | None = None
-        """Of the scan that is shown, what its steps were read as."""
+        self._steps = PartSteps(session, scan_bar)
+        self._entries: tuple[dict[str, Any] | None, ...] = ()
+        """Rows of the table, each as a scan's report would have it."""
         self._placed: list[tuple[float, float]] = []
         self._read: tuple[Gauge, ...] = ()
         self.drawing = PartDrawing(profile.plot, self)
@@ -235,10 +237,11 @@ class PartTab(QWidget):
 
     def _show(self) -> None:
         """Table, editor and drawing of `readings`."""
+        self._entries = tuple(map(self._entry, range(len(self._read))))
         with QSignalBlocker(self.table):
             self.table.setRowCount(len(self._read))
             for row, gauge in enumerate(self._read):
-                self._show_row(row, gauge, self.readings[row] if self.readings else None)
+                self._show_row(row, gauge, self._entries[row])
             if self.chosen >= 0:
                 self.table.selectRow(self.chosen)
         self.table.setVisible(bool(self._read))
@@ -253,74 +256,57 @@ class PartTab(QWidget):
         self.drawing.show_readings(of_laser, profile, own)
         self._tell()
 
-    def _show_row(self, row: int, gauge: Gauge, reading: Reading | None) -> None:
-        texts, tip = (
-            [gauge.name, NONE, NONE, NONE, NONE],
-            f"<p>{TITLES[gauge.kind]}</p>{DEFINITIONS.get(gauge.kind, '')}",
-        )
-        if reading is not None:
-            verdict = "not measured" if reading.reason else verdict_text(reading.verdict, reading.oblique)
-            figures = [small_text(value, gauge.unit) for value in (reading.sigma, reading.error)]
-            texts[1:] = [value_text(reading.value, reading.sigma, gauge.unit), *figures, verdict]
-            truth = value_text(reading.truth, reading.sigma, gauge.unit)
-            ratio = f" ({reading.error_in_sigmas:+.2f} sigma)" if math.isfinite(reading.error_in_sigmas) else ""
-            tip += (
-                f"<p>{reading.reason}</p>"
-                if reading.reason
-                else f"<p>truth {truth}; {reading.points} points{ratio}</p><p>{_sentence(reading.remark)}</p>"
+    def _entry(self, row: int) -> dict[str, Any] | None:
+        """Of all steps where these are asked for and measured like this, else of the step that is looked at."""
+        reading = self.readings[row] if self.readings else None
+        of_all = self._steps.shown(self._read[row] if reading is None else reading.gauge)
+        return of_all or (None if reading is None else judged_over_steps(reading.gauge, [reading]))
+
+    def _show_row(self, row: int, gauge: Gauge, entry: dict[str, Any] | None) -> None:
+        texts = [gauge.name, NONE, NONE, NONE, NONE]
+        tip = f"<p>{TITLES[gauge.kind]}</p>{DEFINITIONS.get(gauge.kind, '')}"
+        if entry is not None:
+            _, value, sigma, _, _, whole_verdict, error, ratio = cells(entry)
+            of = "" if entry["readings"] > 1 or not entry["verdict"] else self._steps.of_which(gauge)
+            texts[1:] = [value, sigma, error, f"{verdict_of(entry)}{of}"]
+            truth = value_text(entry["truth"], entry["sigma"], gauge.unit)
+            in_sigmas = "" if ratio == NONE else f" ({ratio} sigma)"
+            tip += f"<p>{whole_verdict}{of}</p>" + (
+                f"<p>{_sentence(entry['reason'])}</p>"
+                if entry["reason"]
+                else f"<p>truth {truth}; {entry['points']} points{in_sigmas}</p><p>{_sentence(entry['remark'])}</p>"
             )
         for column, text in enumerate(texts):
             item = self.table.show_cell(row, column, text)
             item.setToolTip(tip)
             if column == 0:
                 item.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-            if column == len(texts) - 1 and reading is not None and reading.verdict:
-                item.setForeground(QColor(verdict_colour(reading)))
+            if column == len(texts) - 1 and entry is not None and entry["verdict"]:
+                item.setForeground(QColor(verdict_colour(entry["verdict"])))
 
     def _tell(self) -> None:
         """What to do next, or why the chosen measure has no value."""
         text = "" if self._read else NONE_YET
+        chosen = self.chosen if 0 <= self.chosen < len(self._read) else None
+        gauge, entry = (None, None) if chosen is None else (self._read[chosen], self._entries[chosen])
         if self.placing is not None:
             names = REGIONS[self.placing]
             count = f" ({len(self._placed) + 1} of {len(names)})" if len(names) > 1 else ""
             text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
-        elif 0 <= self.chosen < len(self.readings) and self.readings[self.chosen].reason:
-            text = _sentence(self.readings[self.chosen].reason)
-        elif 0 <= self.chosen < len(self.readings) and self.readings[self.chosen].remark:
-            text = _sentence(f"{self.readings[self.chosen].remark}.")
-        elif 0 <= self.chosen < len(self._read) and (odd := beside_nominal(self._read[self.chosen])):
+        elif entry is not None and (reason := entry["reason"] or entry["first_reason"]):
+            text = _sentence(reason)
+        elif entry is not None and entry["remark"]:
+            text = _sentence(f"{entry['remark']}.")
+        elif gauge is not None and (odd := beside_nominal(gauge)):
             text = odd
         elif self.readings and (render := self.session.shown) is not None:
             text = lean_text(render.project.scene, self.laser, render.frame.step, self.session.project.measured_in)
-        if self._read and (of := self._of_which()):
-            text = f"{of} {text}".strip()
+        if self._read and self.placing is None:
+            kept = entry is not None and entry["reason"] != OF_SCAN
+            text = f"{self._steps.told(gauge, kept, self._read)} {text}".strip()
         self.told.setText(text)
         self.told.setToolTip(text)
         self.told.setVisible(bool(text))
-
-    def _of_which(self) -> str:
-        """Of a scan: whether one step or all are told of, and what all came to, by the tolerance of now."""
-        render = self.session.shown
-        if render is None or render.scan is None or self.placing is not None:
-            return ""
-        scan, gauge = render.scan, self._read[self.chosen] if 0 <= self.chosen < len(self._read) else None
-        told = f"Of step {render.frame.step + 1} of {scan.count}."
-        if gauge is not None and gauge.of_scan:
-            return f"Of all {scan.count} steps together, as measured last." if self._is_kept() else ""
-        if scan.measured_as.measured_in != self.session.project.measured_in:
-            return f"{told} All steps were measured in another section: {AGAIN}."
-        if gauge is None:
-            return f"{told[:-1]}; flatness of all steps." if any(one.of_scan for one in self._read) else told
-        if self._steps is None or self._steps[0] is not scan:
-            self._steps = scan, step_readings(scan.found.folder / "measures.csv", scan.measured_as.measures)
-        found = [readings for was, readings in self._steps[1].items() if was.reads_as(gauge) and readings]
-        if not found:
-            return f"{told} All steps are not measured like this yet: {AGAIN}." if scan.measured else told
-        return f"{told} All steps, as measured last, by the tolerance of now: {_counts(gauge, found[0])}."
-
-    def _is_kept(self) -> bool:
-        """The chosen measure of all steps has what the scan found of it."""
-        return self.chosen < len(self.readings) and self.readings[self.chosen].reason != OF_SCAN
 
     def _lay_out(self) -> None:
         menu = QMenu(self.add)
@@ -355,11 +341,6 @@ class PartTab(QWidget):
 
     def _start_asked(self, kind: Kind, _checked: bool = False) -> None:
         self.start(kind)
-
-
-def _counts(gauge: Gauge, found: list[Reading]) -> str:
-    """Of a gauge's readings in all steps."""
-    return counts_text(verdict_counts(gauge, found))
 
 
 def _free_name(kind: Kind, taken: tuple[Gauge, ...]) -> str:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from pytestqt.qtbot import QtBot
 
 from analysis.gauges.gauge import Gauge
+from analysis.report.gauge_table import cells
 from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.scan_steps import scan_steps
@@ -16,6 +18,7 @@ from studio.qt.core.session import Session
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.results.heads import CHANGED, MEASURED_OTHERWISE
 from studio.qt.results.results_panel import PART, ResultsPanel
+from studio.scan.gauging import measures_record, step_readings
 from studio.scan.options import ScanOptions
 from studio.scan.region import Region
 from studio.scan.scan import run_scan
@@ -54,14 +57,43 @@ def panel(scanned: tuple[Path, Path], qtbot: QtBot) -> Iterator[ResultsPanel]:
     develop.close()
 
 
+def verdict(panel: ResultsPanel, row: int = 0) -> str:
+    return panel.part.table.item(row, 4).text()
+
+
+def test_a_verdict_is_over_all_steps_or_names_its_step(panel: ResultsPanel) -> None:
+    """The first step's "pass" stood beside a measure of which the scan's report said "undecided"."""
+    session, part = panel.session, panel.part
+    assert session.shown is not None and session.shown.scan is not None
+    steps = step_readings(session.shown.scan.found.folder / "measures.csv", (LEVEL,))[LEVEL]
+    second, highest = sorted(one.value + 2.0 * one.sigma for one in steps)[1:]
+    gauge = LEVEL.model_copy(update={"upper": 0.5 * (second + highest)})
+    session.set(("measures", 0), gauge)
+    (row,) = measures_record((gauge,), [replace(one, gauge=gauge) for one in steps])
+    worst = row["step"] + 1
+    assert row["verdict"] != "pass" and row["verdicts"]["pass"] == 2
+    shown = [part.table.item(0, column).text() for column in range(4)]
+    assert shown[1:] == [cells(row)[column] for column in (1, 2, 6)]
+    assert verdict(panel).endswith(f"{row['verdict']}: 2 pass, 1 {row['verdict']}")
+    assert f"worst: step {worst} of 3" in part.table.item(0, 4).toolTip()
+    part.table.selectRow(0)
+    assert f"2 pass, 1 {row['verdict']}. Its value is of the worst: step {worst} of 3." in part.told.text()
+    panel.scan_bar.scope.setCurrentIndex(1)
+    assert verdict(panel).endswith(f"{gauge.verdict(steps[0].value, steps[0].sigma)}, step 1")
+    assert part.told.text().startswith("Of step 1 of 3. All steps, as measured last")
+
+
 def test_counts_of_all_steps_follow_the_tolerance(panel: ResultsPanel) -> None:
     session, told = panel.session, panel.part.told
+    panel.scan_bar.scope.setCurrentIndex(1)
     panel.part.table.selectRow(0)
     assert told.text().startswith("Of step 1 of 3. All steps, as measured last, by the tolerance of now: 3 pass.")
     session.set(("measures", 0, "nominal"), 1.0)
     assert "3 fail." in told.text() and "pass" not in told.text()
     session.set(("measures", 0, "regions"), ((-0.2, -0.15), (0.1, 0.2)))
     assert "not measured like this yet: Measure > Measure the scan again" in told.text() and "fail" not in told.text()
+    panel.scan_bar.scope.setCurrentIndex(0)
+    assert verdict(panel).endswith("fail, step 1"), "all steps were measured otherwise"
 
 
 def test_a_flatness_is_of_all_steps(panel: ResultsPanel) -> None:
