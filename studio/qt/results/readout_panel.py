@@ -30,7 +30,7 @@ from studio.qt.results.remedy_list import RemedyList, sentence
 LEAST_NAME = 72
 """px of the name of a read-out, where there is too little room for the whole."""
 LEFT, SPACING, RIGHT = 10, 8, 4
-"""px before a name, between it, its value and its range, and after."""
+"""px before a name, between it, its value, its range and what would fix it, and after."""
 
 
 class ReadoutPanel(QWidget):
@@ -93,12 +93,14 @@ class ReadoutPanel(QWidget):
     def _fit_notes(self) -> None:
         """Ranges below their values where one of them has no room beside."""
         widths = [[label.sizeHint().width() for label in self._labels[row.key]] for row in self._rows]
-        wanted = sum(map(max, zip(*widths, strict=True)), LEFT + RIGHT + 2 * SPACING) if widths else 0
+        fix = max((button.sizeHint().width() for button in self._fix.values()), default=0)
+        # also while no button is seen, as one that comes would else move the fields from under the mouse
+        wanted = sum(map(max, zip(*widths, strict=True)), LEFT + RIGHT + 3 * SPACING + fix) if widths else 0
         narrow = self.width() - self._area.verticalScrollBar().sizeHint().width() < wanted
         if narrow != self._narrow:
             self._narrow = narrow
-            for row, (_, _, note) in enumerate(self._labels.values()):
-                self._place_note(row, note)
+            for row, (key, (_, _, note)) in enumerate(self._labels.items()):
+                self._place(row, note, self._fix[key])
 
     def rows(self) -> tuple[Row, ...]:
         """What is shown."""
@@ -139,7 +141,6 @@ class ReadoutPanel(QWidget):
     def _paint(self) -> None:
         colours = theme.colours()
         keys = {row.key for row in self._rows}
-        offered = {one.key for one in self.fixes.found}
         for key, labels in self._labels.items():
             for label in labels:
                 label.setVisible(key in keys)
@@ -155,7 +156,7 @@ class ReadoutPanel(QWidget):
                 policy = note.sizePolicy()
                 policy.setRetainSizeWhenHidden(True)
                 note.setSizePolicy(policy)
-            note.setVisible(bool(row.note) and row.key not in offered)
+            note.setVisible(bool(row.note))
             told = f"<p>{row.label}: {row.help}</p>" + (f"<p>{row.note}</p>" if row.note else "")
             for label, style in (
                 (name, f"color: {colours.muted}"),
@@ -173,12 +174,10 @@ class ReadoutPanel(QWidget):
         self._fit_notes()
 
     def _offer_fixes(self) -> None:
-        """A button in each row that something would fix, in the place of its range."""
+        """A button in each row that something would fix, beside its range."""
         offered = {one.key: one for one in self.fixes.found}
         for key, button in self._fix.items():
             button.setVisible(key in offered)
-            note = self._labels[key][2]
-            note.setVisible(bool(note.text()) and key not in offered)
             if key in offered:
                 button.setToolTip(f"<p>{sentence(offered[key])}. Ctrl+Z takes it back.</p>")
 
@@ -200,22 +199,23 @@ class ReadoutPanel(QWidget):
         row = len(self._labels)
         for column, label in enumerate((name, value)):
             self._grid.addWidget(label, 2 * row, column)
-        self._place_note(row, note)
         for label in (name, value, note):
             label.show()
         button = QToolButton()
         button.setText("Fix")
         button.setObjectName("fix")
         button.clicked.connect(partial(self._apply, key))
-        self._grid.addWidget(button, 2 * row, 2, Qt.AlignmentFlag.AlignLeft)
+        self._place(row, note, button)
         button.hide()
         self._fix[key] = button
         self._labels[key] = (name, value, note)
         return name, value, note
 
-    def _place_note(self, row: int, note: QWidget) -> None:
+    def _place(self, row: int, note: QWidget, button: QWidget) -> None:
         """Each read-out has two lines of the grid, the lower of which is for a range that has no room beside."""
         if self._narrow:
-            self._grid.addWidget(note, 2 * row + 1, 1, 1, 2)
+            self._grid.addWidget(note, 2 * row + 1, 1, 1, 3)
+            self._grid.addWidget(button, 2 * row, 2, 1, 2, Qt.AlignmentFlag.AlignLeft)
         else:
             self._grid.addWidget(note, 2 * row, 2)
+            self._grid.addWidget(button, 2 * row, 3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
@@ -105,3 +106,23 @@ def test_a_range_that_goes_moves_no_field_below_it(qtbot: QtBot) -> None:
     panel._paint()
     qtbot.wait(20)
     assert panel.placing.fields["standoff"].y() == below and not note.isVisible()
+
+
+@pytest.mark.parametrize("width", [0, 270, 300, 380, 460, 560])
+def test_what_goes_with_a_value_is_read_beside_the_button_that_fixes_it(qtbot: QtBot, width: int) -> None:
+    """Of a defocus that is off in images the panel showed an amber number, a button and a blank line."""
+    panel = panel_on(qtbot)
+    session = panel._session
+    session.set((*LASERS, 0, "power"), 2.0)
+    session.set(("scene", "rig", "camera", "lens", "f_number"), 1.4)
+    keys = ("saturated", "blur")
+    qtbot.waitUntil(lambda: all(panel._fix[key].isVisible() for key in keys), timeout=10_000)
+    content = panel._area.widget()
+    panel.resize(max(width, content.minimumSizeHint().width()), 900)
+    qtbot.wait(20)
+    for key in keys:
+        note, button = panel._labels[key][2], panel._fix[key]
+        assert note.isVisible() and note.text().endswith({"saturated": "% of full well", "blur": "off in images"}[key])
+        assert note.width() >= note.fontMetrics().horizontalAdvance(note.text()), f"{key}: {note.text()} at {width} px"
+        assert not note.geometry().intersects(button.geometry())
+        assert content.rect().contains(button.geometry()) and content.width() <= panel.width()
