@@ -67,7 +67,7 @@ Region = tuple[Place, Place]
 
 
 class Gauge(Model):
-    """A measure of the part. Its sizes are m, an angle's rad, an area's m^2."""
+    """A measure of the part. Its sizes are m, an angle's rad, an area's m^2, nominal and tolerance too."""
 
     name: str = quantity("measure", label="Name", min_length=1, max_length=80)
     kind: Kind = quantity("step", label="Kind", help="What is measured.")
@@ -76,14 +76,12 @@ class Gauge(Model):
     regions: tuple[Region, ...] = quantity(
         unit="m", label="Regions", help="From and to across the fan, as the profile's plot has it.", max_length=3
     )
-    nominal: float | None = quantity(
-        None, unit="m", label="Nominal", help="In m; of an angle in rad, of an area in m².", ge=-100, le=100
-    )
+    nominal: float | None = quantity(None, unit="m", label="Nominal", help="What the drawing has.", ge=-100, le=100)
     lower: float | None = quantity(
         None,
         unit="m",
         label="Lower tolerance",
-        help="Deviation from the nominal: m, rad, m².",
+        help="Deviation from the nominal, below it with a minus sign.",
         ge=-100,
         le=100,
     )
@@ -91,7 +89,7 @@ class Gauge(Model):
         None,
         unit="m",
         label="Upper tolerance",
-        help="Deviation from the nominal: m, rad, m².",
+        help="Deviation from the nominal, below it with a minus sign.",
         ge=-100,
         le=100,
     )

@@ -95,7 +95,9 @@ class PartEditor(QWidget):
             if name == "name":
                 field: TextField = TextField(spec)
             else:
-                field = NumberField(replace(spec, unit=Unit.of(gauge.unit)))
+                unit = Unit.of(gauge.unit)
+                spec = replace(spec, unit=unit, help=f"{spec.help} In {unit.shown}, unless another unit is typed.")
+                field = NumberField(spec)
                 field.drag_began.connect(self.session.begin_drag)
                 field.dragged.connect(partial(self._drag, name))
                 field.drag_ended.connect(self._end_drag)

@@ -61,3 +61,14 @@ def test_of_all_others_a_person_says_it_first(session: Session, kind: Kind, qtbo
     editor = editor_of(session, kind, qtbot)
     assert [editor.fields[name].isEnabled() for name in ("lower", "upper")] == [False, False]
     assert editor.fields["upper"].placeholderText() == "nominal first"
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("step", "mm"), ("angle", "deg"), ("area", "mm²")])
+def test_nominal_and_tolerance_name_the_unit_that_they_are_typed_in(
+    session: Session, kind: Kind, unit: str, qtbot: QtBot
+) -> None:
+    """Of a field that takes mm the tip said m, rad, m²."""
+    editor = editor_of(session, kind, qtbot, nominal=0.002)
+    for name in ("nominal", "lower", "upper"):
+        tip = editor.fields[name].toolTip()
+        assert f"In {unit}, unless another unit is typed." in tip and "m, rad" not in tip
