@@ -26,17 +26,26 @@ class Delivery(Model):
     lower: float | None = quantity(
         None,
         unit="m",
-        label="Surface from",
-        help="Tolerance of the surface's deviation, as of too little material: below 0 for most parts.",
+        label="Surface tolerance from",
+        help="Lower limit of the surface's deviation. Missing material has a minus sign: -50 µm allows 50 µm too "
+        "little. Empty: there is no lower limit.",
         ge=-1.0,
         le=1.0,
     )
     upper: float | None = quantity(
-        None, unit="m", label="Surface to", help="Its upper limit; empty: there is none.", ge=-1.0, le=1.0
+        None,
+        unit="m",
+        label="Surface tolerance to",
+        help="Upper limit of the surface's deviation: 50 µm allows 50 µm too much material. Empty: there is no upper "
+        "limit.",
+        ge=-1.0,
+        le=1.0,
     )
-
     surface_of: str = quantity(
-        "", label="Surface of", help="The object that the surface is judged on; empty: all of them.", max_length=LONG
+        "",
+        label="Surface tolerance of",
+        help="The object whose surface the tolerance is of; empty: all of them.",
+        max_length=LONG,
     )
 
     @model_validator(mode="after")
