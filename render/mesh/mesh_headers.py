@@ -24,6 +24,7 @@ GLTF_EXTENSIONS = ("KHR_materials", "KHR_lights", "EXT_texture_webp")
 GLTF_FLOAT = 5126
 EXPORT = "export the mesh again"
 NUMBER = re.compile(rb"[-+]?(\d+/)*(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?/*|\d+(//?\d+)*")
+OBJ_VERTEX = re.compile(rb"(?:^|\r)[ \t]*v[ \t]+[-+.\dni]", re.MULTILINE | re.IGNORECASE)
 PLY_SIZES = {
     **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
     **dict.fromkeys(("short", "ushort", "int16", "uint16", "float16"), 2),
@@ -59,6 +60,9 @@ def declared_faces(data: bytes, kind: str, where: str) -> int:
             return _off(data, where)
         case "obj":
             check_text(data, kind, where)
+            if not OBJ_VERTEX.search(data):
+                found = f"no line of a vertex in {len(data)} bytes"
+                raise damaged(kind, where, found, "text with lines such as v 0 0 0 and f 1 2 3")
             faces = len(re.findall(rb"^[ \t]*f\s", data, re.MULTILINE))
             check_triangle_count(faces, where)
             return faces

@@ -158,7 +158,8 @@ def read_parts(path: Path, where: str, files: SideFiles, *, colours: bool) -> li
         skip = not colours and kind not in ("gltf", "glb")
         options = {"process": False, "use_embree": False, "skip_materials": skip}
         stream: Any = io.BytesIO(as_triangles(data, kind, where))
-        parts = _placed(trimesh.load_scene(stream, file_type=kind, resolver=files, **options), where)
+        scene = trimesh.load_scene(stream, file_type=kind, resolver=files, **options)
+        parts = _placed(scene, where)
     except InputError:
         raise
     except MemoryError:
@@ -174,12 +175,11 @@ def read_parts(path: Path, where: str, files: SideFiles, *, colours: bool) -> li
     if read < declared:
         raise damaged(kind, where, bad_line(data, kind) or f"{declared} faces of which {read} can be read")
     if not parts:
-        raise InputError(
-            "the mesh has no triangles",
-            where=where,
-            found=bad_line(data, kind) or "no faces (a point cloud?)",
-            cure="mesh the points first, or export the faces too",
-        )
+        # of an OBJ without faces trimesh keeps no vertices, without which its header is refused
+        points = kind == "obj" or any(len(getattr(one, "vertices", ())) for one in scene.geometry.values())
+        told = "no faces (a point cloud?)" if points else "neither vertices nor faces"
+        cure = "mesh the points first, or export the faces too" if points else EXPORT
+        raise InputError("the mesh has no triangles", where=where, found=bad_line(data, kind) or told, cure=cure)
     return parts
 
 
