@@ -186,9 +186,11 @@ def _focus(r: Readouts) -> Row:
     note = f"sharp {_length(r.sharp_nearest)} to {_length(r.sharp_farthest)}" if r.blurs_images else "off in images"
     if r.blur_px is None:
         return Row("blur", "Defocus blur", NOTHING, note, "", help)
-    worst = r.blur_px.high
+    worst = round(r.blur_px.high, 2)
     level: Level = "" if worst <= SHARP_PX else "warning" if worst <= BLURRED_PX else "error"
-    return Row("blur", "Defocus blur", f"{worst:.1f} px", note, level, help)
+    # what is beyond a limit must not read as the limit itself
+    reads_as_limit = any(limit < worst and f"{worst:.1f}" == f"{limit:.1f}" for limit in (SHARP_PX, BLURRED_PX))
+    return Row("blur", "Defocus blur", f"{worst:.{2 if reads_as_limit else 1}f} px", note, level, help)
 
 
 def _sigma(r: Readouts) -> Row:
