@@ -135,7 +135,7 @@ class ExportActions(QObject):
         }
 
         def work(progress: Progress, cancelled: Cancel) -> list[Path]:
-            progress(path.name, 0.0)  # how far it is, nobody knows
+            progress("", 0.0)  # how far it is, nobody knows, and the job's name has the file's
             writer = writers[kind]
             if whole is not None:
                 writer = _of_all_steps(kind, whole, how.powered, Clock(progress, cancelled))

@@ -120,3 +120,19 @@ def test_an_export_that_takes_longer_beside_other_work_is_told_at_once(
     go_on.set()
     qtbot.waitUntil(lambda: not runner.busy)
     runner.close()
+
+
+def test_the_name_of_a_file_is_told_once_while_it_is_written(
+    measured: tuple[Session, DevelopPanel], qtbot: QtBot, tmp_path: Path
+) -> None:
+    """ "export a.csv: a.csv", said the status bar."""
+    session, panel = measured
+    panel.close()
+    window = QMainWindow()
+    qtbot.addWidget(window)
+    runner = JobRunner(window)
+    actions = ExportActions(window, session, runner, PreferencesFile(tmp_path / "p.json"), Actions(window))
+    with qtbot.waitSignal(runner.finished) as ended:
+        actions.write("export_csv", tmp_path / "a.csv")
+    assert f"{ended.args[0].name}: {ended.args[0].stage}".count("a.csv") == 1
+    runner.close()
