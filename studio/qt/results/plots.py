@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QFontMetricsF
 
 from studio.qt.core import theme
 
@@ -80,6 +81,16 @@ class UprightAxis(pg.AxisItem):  # type: ignore[misc]
     def __init__(self) -> None:
         super().__init__("left")
 
+    def tickSpacing(self, minVal: float, maxVal: float, size: float) -> list[tuple[float, float]]:
+        """Labels of the coarsest ticks are drawn however low the plot is: they get farther apart there."""
+        levels = [(float(spacing), float(offset)) for spacing, offset in super().tickSpacing(minVal, maxVal, size)]
+        apart = QFontMetricsF(self.font()).height() * (maxVal - minVal) / max(size, 1.0)
+        low, high = minVal + 0.5 * apart, maxVal - 0.5 * apart
+        # of two labels that are seen one is left at twice their distance
+        while levels[0][0] < apart and math.floor(high / levels[0][0]) > math.ceil(low / levels[0][0]):
+            levels = [(2.0 * levels[0][0], 0.0), *levels]
+        return levels
+
     def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:
         """From 10,000 on in thousands, so that the minus sign has room."""
         if len(values) and max(abs(float(value) * scale) for value in values) >= 1e4:
@@ -90,6 +101,17 @@ class UprightAxis(pg.AxisItem):  # type: ignore[misc]
         super().resizeEvent(event)
         # the title itself knows nothing of its being turned
         self.label.setVisible(self.label.boundingRect().width() <= self.size().height())
+
+
+class WholeAxis(pg.AxisItem):  # type: ignore[misc]
+    """A lower axis of what is counted: there is nothing between two whole numbers."""
+
+    def __init__(self) -> None:
+        super().__init__("bottom")
+
+    def tickSpacing(self, minVal: float, maxVal: float, size: float) -> list[tuple[float, float]]:
+        found = super().tickSpacing(minVal, maxVal, size)
+        return [(float(spacing), 0.0) for spacing, _ in found if spacing >= 1.0] or [(1.0, 0.0)]
 
 
 class PointedPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
@@ -153,9 +175,15 @@ class PointedPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             self.chosen.emit(scan_line)
 
 
-def new_plot(bottom: str = "", left: str = "", left_unit: str = "", box: pg.ViewBox | None = None) -> pg.PlotItem:
-    """An empty plot; the unit is part of the label, so that no prefix is put before it."""
-    plot = pg.PlotItem(viewBox=box, axisItems={"left": UprightAxis()})
+def new_plot(
+    bottom: str = "",
+    left: str = "",
+    left_unit: str = "",
+    box: pg.ViewBox | None = None,
+    lower: pg.AxisItem | None = None,
+) -> pg.PlotItem:
+    """An empty plot; the unit is part of the label, so that no prefix is put before it. lower: the axis of x."""
+    plot = pg.PlotItem(viewBox=box, axisItems={"left": UprightAxis(), "bottom": lower or pg.AxisItem("bottom")})
     plot.setLabel("left", f"{left} / {left_unit}" if left_unit else left)
     if bottom:
         plot.setLabel("bottom", bottom)
@@ -167,9 +195,11 @@ def new_plot(bottom: str = "", left: str = "", left_unit: str = "", box: pg.View
     return plot
 
 
-def only_plot(widget: pg.GraphicsLayoutWidget, bottom: str, left: str, angle: float) -> tuple[Any, Any, Any]:
+def only_plot(
+    widget: pg.GraphicsLayoutWidget, bottom: str, left: str, angle: float, lower: pg.AxisItem | None = None
+) -> tuple[Any, Any, Any]:
     """The one plot of a widget, a line through its zero at an angle, degrees, and its cursor."""
-    plot = new_plot(bottom, left)
+    plot = new_plot(bottom, left, lower=lower)
     widget.addItem(plot)
     plot.getAxis("left").setWidth(62)
     widget.ci.layout.setContentsMargins(2, 4, 8, 2)

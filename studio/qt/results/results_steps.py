@@ -21,7 +21,7 @@ class StepsPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__()
-        self.plot, self.zero, self.cursor = plots.only_plot(self, "Step", "Error", 0.0)
+        self.plot, self.zero, self.cursor = plots.only_plot(self, "Step", "Error", 0.0, plots.WholeAxis())
         self.rmse = pg.PlotDataItem(connect="finite", symbolSize=5, symbolPen=None)
         self.bias = pg.PlotDataItem(connect="finite")
         for item in (self.bias, self.rmse):
