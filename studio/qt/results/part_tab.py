@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, value_text, verdict_of
+from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, value_text, verdict_text
 from analysis.report.units import NONE
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.delete_key import DeleteKey
@@ -268,7 +268,9 @@ class PartTab(QWidget):
         if entry is not None:
             _, value, sigma, _, _, whole_verdict, error, ratio = cells(entry)
             of = "" if entry["readings"] > 1 or not entry["verdict"] else self._steps.of_which(gauge)
-            texts[1:] = [value, sigma, error, f"{verdict_of(entry)}{of}"]
+            # counts have no room beside a name: the tip has them
+            verdict = "not measured" if entry["reason"] else verdict_text(entry["verdict"], entry["oblique"])
+            texts[1:] = [value, sigma, error, f"{verdict}{of}"]
             truth = value_text(entry["truth"], entry["sigma"], gauge.unit)
             in_sigmas = "" if ratio == NONE else f" ({ratio} sigma)"
             tip += f"<p>{whole_verdict}{of}</p>" + (
