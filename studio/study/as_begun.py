@@ -25,7 +25,8 @@ def as_begun(study: Study, bases: Mapping[str, Project], begun: Mapping[str, Pro
     part and the report that the study does not ask for. So every row of the folder has the same columns and none is
     measured twice.
     """
-    return {name: _one(study, name, base, begun.get(name)) for name, base in bases.items()}
+    before = _before(bases, begun)
+    return {name: _one(study, name, base, before.get(name)) for name, base in bases.items()}
 
 
 def begun_in(folder: Path, study: Study, bases: Mapping[str, Project]) -> dict[str, Project]:
@@ -49,8 +50,9 @@ def set_apart(
         there, now = begun.set.get(name, "not fixed"), study.set.get(name, "not fixed")
         if there != now:
             told.append(f"{name}, which is fixed: {there} in the folder, {now} now")
+    known = _before(bases, begun_with)
     for name, base in as_begun(study, bases, begun_with).items():
-        before = begun_with.get(name)
+        before = known.get(name)
         if before is None:
             told.append(f"Base project: {', '.join(sorted(begun_with))} in the folder, {name} now")
             continue
@@ -63,6 +65,20 @@ def told_apart(apart: tuple[str, ...]) -> str:
     """In one line, the first few of them."""
     more = len(apart) - MOST_TOLD
     return "; ".join(apart[:MOST_TOLD]) + (f"; and {more} more" if more > 0 else "")
+
+
+def _before(bases: Mapping[str, Project], begun: Mapping[str, Project]) -> dict[str, Project]:
+    """What each base project was in the folder: the one of its name, else the one that it differs from least.
+
+    A project's file may have another name since, or its first one, and holds what it held.
+    """
+    found = {name: begun[name] for name in bases if name in begun}
+    left = [begun[name] for name in begun if name not in bases]
+    for name in bases:
+        if name not in found and left:
+            apart = [sum(1 for _ in changes(one, bases[name])) for one in left]
+            found[name] = left.pop(apart.index(min(apart)))
+    return found
 
 
 def _one(study: Study, name: str, base: Project, begun: Project | None) -> Project:

@@ -215,13 +215,16 @@ class Study(Model):
         return load_model(cls, path, FOLDER, "study")
 
     def digest(self, bases: dict[str, Project]) -> str:
-        """What decides a cell's numbers beside its key, as SHA-256: the program, the bases, what is fixed."""
+        """What decides a cell's numbers beside its key, as SHA-256: the program, the bases, what is fixed.
+
+        Bases count by what is in them: their files may have other names since.
+        """
         said = {
             "program": program_digest(),
             "image_scale": self.image_scale,
             "laser": self.laser,
             "set": self.set,
-            "bases": {name: base.model_dump(mode="json") for name, base in sorted(bases.items())},
+            "bases": sorted({json.dumps(base.model_dump(mode="json"), sort_keys=True) for base in bases.values()}),
         }
         return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 

@@ -137,3 +137,28 @@ def test_digests_of_meshes_that_saving_writes_lock_nothing_out(tmp_path: Path) -
             store.describe(study, begun)
     assert begun_in(tmp_path / "unsaved", study, saved) == unsaved
     assert begun_in(tmp_path / "saved", study, other) == other
+
+
+def test_another_name_of_the_base_projects_file_is_no_other_study(tmp_path: Path) -> None:
+    """A project that is saved for the first time, or copied, holds what it held."""
+    study, bases = study_of("depth_rmse")
+    base = bases["step_block"]
+    with Store(tmp_path, study.digest(bases)) as store:
+        store.describe(study, bases)
+    renamed = study.model_copy(update={"base": "p1.json"})
+    moved = {"p1.json": base.replaced({"name": "p1"}).in_folder(tmp_path)}
+    assert set_apart(renamed, moved, study, bases) == ()
+    with begin(tmp_path, renamed, begun_in(tmp_path, renamed, moved), Engine(1)):
+        pass
+    other = {"p1.json": base.replaced({"sensor.bits": 8})}
+    assert set_apart(renamed, other, study, bases) == ("Sensor: Bit depth: 12 in the folder, 8 now",)
+    assert renamed.digest(other) != study.digest(bases)
+
+
+def test_of_several_base_projects_with_other_names_each_is_held_against_its_own() -> None:
+    study, bases = study_of("depth_rmse")
+    first = bases["step_block"]
+    second = first.replaced({"sensor.bits": 8, "sensor.read_noise": 4.0})
+    now = {"b.json": second.replaced({"sensor.read_noise": 5.0}), "a.json": first}
+    told = set_apart(study, now, study, {"one.json": first, "two.json": second})
+    assert told == ("Sensor: Read noise: 4 e- in the folder, 5 e- now",)

@@ -106,3 +106,27 @@ def test_the_folder_of_results_is_there_again_after_a_kill(desk: Desk, qtbot: Qt
     assert work.problem == ""
     work.close()
     live(again).close()
+
+
+def test_a_project_saved_for_the_first_time_goes_on_with_the_study_that_it_had_begun(
+    desk: Desk, qtbot: QtBot, tmp_path: Path
+) -> None:
+    """Only the name of its file is another after the next start: what is in it is as it was."""
+    desk.session.replace_document(Document(desk.session.project))
+    desk.small([2.0])
+    desk.work.choose_folder(tmp_path / "out")
+    run(qtbot, desk)
+    assert desk.work.failure == "" and desk.work.found is not None and len(desk.work.found.rows) == 1
+    file = tmp_path / "p1.json"
+    desk.session.document.save(file)
+    desk.work.close()
+    again = Session(Document(Project.load(file), file))
+    work = one_of(StudyWork, again)
+    work.look()
+    qtbot.waitUntil(lambda: work.found is not None and work.estimate is not None)
+    assert work.draft["base"] == "p1.json" and work.problem == "" and work.estimate.cells == 0
+    assert again.set(POWER, 0.033)
+    work.look_ahead()
+    assert "Power: " in work.problem and "Base project" not in work.problem
+    work.close()
+    live(again).close()
