@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QPushButton,
     QSizePolicy,
-    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -30,6 +29,7 @@ from studio.qt.image.line_overlay import BOX_PX, LineOverlay, swatch
 from studio.qt.image.picture_clicks import PictureClicks
 from studio.qt.image.row_profile import RowProfile
 from studio.qt.image.scan_line_marks import ScanLineMarks
+from studio.qt.image.zooms import Zooms
 from studio.runtime.jobs import Progress
 from studio.scan.frame_views import SATURATED, at_pixel, live_picture, picture, views
 
@@ -39,7 +39,7 @@ HOVER_HZ = 30
 LOW = 400
 """px of height, for picture and profile together."""
 NARROW, TINY, LEAST_CHOICE = 600, 480, 124
-"""px, below which lines' boxes take room of the choice, which keeps so much; of zooming."""
+"""px, below which lines' boxes take room of the choice, which keeps so much; and zooming is one button."""
 MARGIN_PX, SPACE_PX = 6, 8
 LEAST_HEIGHT = 260
 """px, from which names of lines may have a row of their own."""
@@ -68,7 +68,7 @@ class CameraView(QWidget):
         self.saturated = QCheckBox(SATURATED_NAME)
         self.saturated.setIcon(swatch(SATURATED))
         self.saturated.setChecked(True)
-        self.zooms = QToolButton(), QToolButton()
+        self.zooms = Zooms(self.view)
         self.readout = QLabel()
         self.badge = QFrame()
         self.badge_text = QLabel(wordWrap=True)
@@ -121,13 +121,7 @@ class CameraView(QWidget):
         self.lines.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.first.addWidget(self.lines, 1)
         self.bar.addLayout(self.first, 1)
-        fit = "Fit", "The whole image (F)", self.view.fit
-        one_to_one = "1:1", "One screen pixel a pixel", self.view.one_to_one
-        for button, (text, tip, action) in zip(self.zooms, (fit, one_to_one), strict=True):
-            button.setText(text)
-            button.setToolTip(tip)
-            button.clicked.connect(action)
-            self.bar.addWidget(button)
+        self.bar.addWidget(self.zooms)
         badge = QHBoxLayout(self.badge)
         badge.setContentsMargins(8, 3, 4, 3)
         badge.addWidget(self.badge_text, 1)
@@ -316,9 +310,8 @@ class CameraView(QWidget):
         """Lines' boxes have their names where there is room for them: beside the others, else in a row of their own."""
         width, lines = self.width(), self.overlay.width_named()
         self.choice.setMaximumWidth(LEAST_CHOICE if width < NARROW else self.choice.sizeHint().width())
-        for button in self.zooms:
-            button.setVisible(width >= TINY)
-        shown = [box for box in (self.choice, self.bright, *self.zooms) if not box.isHidden()]
+        self.zooms.spread(width >= TINY)
+        shown = self.choice, self.bright, self.zooms
         spaces = (len(shown) + 4) * max(self.bar.spacing(), 0) + 2 * SPACE_PX + 2 * MARGIN_PX
         others = sum(min(box.sizeHint().width(), box.maximumWidth()) for box in shown) + spaces + BOX_PX
         name = self.saturated.fontMetrics().horizontalAdvance(SATURATED_NAME)

@@ -234,6 +234,23 @@ def test_boxes_have_their_names_as_far_as_there_is_room(qtbot, made):
         assert made.lines.width() >= made.overlay.width_within(made.lines.width())
 
 
+def test_the_whole_image_is_a_click_away_in_a_narrow_view_and_by_the_pictures_menu(qtbot, made):
+    for width in (900, 400):
+        made.resize(width, 500)
+        qtbot.wait(20)
+        shown = [one for one in (*made.zooms.buttons, made.zooms.more) if one.isVisible()]
+        assert len(shown) == (2 if width == 900 else 1)
+        assert all(made.zooms.x() + one.geometry().right() < made.width() for one in shown)
+    fit, one_to_one = made.zooms.menu.actions()
+    one_to_one.trigger()
+    before = made.view.zoom
+    fit.trigger()
+    assert before == pytest.approx(1.0) and made.view.zoom != before
+    qtbot.mouseClick(made.view.viewport(), Qt.MouseButton.RightButton, pos=made.view.viewport().rect().center())
+    qtbot.waitUntil(made.zooms.menu.isVisible)
+    made.zooms.menu.close()
+
+
 def test_keeping_the_place_when_the_size_changes(qtbot, made):
     view = made.view
     view.box.setRange(xRange=(99.5, 199.5), yRange=(99.5, 149.5), padding=0)
