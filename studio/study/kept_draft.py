@@ -8,22 +8,29 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
+from render.base.errors import InputError
 from render.base.files import atomic_write
+from studio.project.project import Project
 from studio.runtime.preferences import state_folder
 from studio.study.draft import Data, varies_nothing
+from studio.study.store import bases_data, bases_from
 
 KEPT = 100
 """Of the last projects."""
-RESULTS = "results"
-"""Beside what a study's file has: its folder."""
+RESULTS, BASES = "results", "bases"
+"""Beside what a study's file has: its folder, and base projects of its own."""
 LARGEST = 1 << 20
 """Bytes of a file that is read."""
 
 
-def keep_draft(project: Path, draft: Data, folder: Path | None = None) -> None:
-    """Of the project's file, with its folder of results.
+def keep_draft(
+    project: Path, draft: Data, folder: Path | None = None, bases: Mapping[str, Project] = MappingProxyType({})
+) -> None:
+    """Of the project's file, with its folder of results, and bases that are not that project.
 
     A draft that varies nothing is nothing to keep; a full disk keeps none and is no fault.
     """
@@ -34,17 +41,23 @@ def keep_draft(project: Path, draft: Data, folder: Path | None = None) -> None:
             return
         file.parent.mkdir(parents=True, exist_ok=True)
         with atomic_write(file) as temporary:
-            kept = draft if folder is None else {**draft, RESULTS: str(folder.resolve())}
-            temporary.write_text(json.dumps(kept), encoding="utf-8")
+            results = {} if folder is None else {RESULTS: str(folder.resolve())}
+            temporary.write_text(json.dumps({**draft, **results, BASES: bases_data(bases)}), encoding="utf-8")
         others = sorted(file.parent.glob("*.json"), key=lambda other: other.stat().st_mtime)
         for old in others[:-KEPT]:
             old.unlink(missing_ok=True)
 
 
-def kept_draft(project: Path, base: str) -> Data | None:
-    """As it was kept, of the open project by its name in studies; None: there is none, or it is none any more."""
-    draft = {name: value for name, value in _read(project).items() if name != RESULTS} | {"base": base}
-    return draft if _is_draft(draft) else None
+def kept_draft(project: Path, base: str) -> tuple[Data, dict[str, Project]] | None:
+    """As it was kept, of the open project by its name in studies, and its own bases; None: there is none any more."""
+    kept = _read(project)
+    draft = {name: value for name, value in kept.items() if name not in (RESULTS, BASES)}
+    with contextlib.suppress(InputError, KeyError, TypeError, AttributeError):
+        bases = bases_from(kept.get(BASES, {}), _file(project))
+        if draft.get("base") not in bases:
+            draft["base"] = base
+        return (draft, bases) if _is_draft(draft) else None
+    return None
 
 
 def kept_folder(project: Path) -> Path | None:

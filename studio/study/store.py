@@ -90,8 +90,7 @@ class Store:
 
     def describe(self, study: Study, bases: Mapping[str, Project]) -> None:
         """Keep the study as it is now, with its base projects, so that the folder alone tells what it holds."""
-        said = {name: {"project": base.to_text(), "folder": str(base.folder.resolve())} for name, base in bases.items()}
-        pairs = (("study", study.model_dump_json()), ("bases", json.dumps(said)))
+        pairs = (("study", study.model_dump_json()), ("bases", json.dumps(bases_data(bases))))
         with self._transaction():
             self._connection.executemany("INSERT OR REPLACE INTO about VALUES (?, ?)", pairs)
 
@@ -141,11 +140,21 @@ def described(folder: Path) -> tuple[Study, dict[str, Project]]:
         with closing(sqlite3.connect(f"file:{quote(str(path.resolve()))}?mode=ro", uri=True)) as connection:
             about = dict(connection.execute("SELECT name, value FROM about"))
         study = Study.model_validate_json(about["study"])
-        bases = {
-            name: Project.from_text(one["project"], f"{path}: {name}").in_folder(one["folder"])
-            for name, one in json.loads(about["bases"]).items()
-        }
+        bases = bases_from(json.loads(about["bases"]), path)
     except (sqlite3.DatabaseError, KeyError, TypeError, AttributeError, ValidationError, json.JSONDecodeError):
         cure = "run the study again into another folder"
         raise InputError("the study's store cannot be read", where=str(path), cure=cure) from None
     return study, bases
+
+
+def bases_data(bases: Mapping[str, Project]) -> dict[str, dict[str, str]]:
+    """Base projects with their folders, as a file holds them."""
+    return {name: {"project": base.to_text(), "folder": str(base.folder.resolve())} for name, base in bases.items()}
+
+
+def bases_from(data: Mapping[str, Any], path: Path) -> dict[str, Project]:
+    """The same from a file at `path`. InputError: one is none any more; KeyError, TypeError: it holds no bases."""
+    return {
+        name: Project.from_text(one["project"], f"{path}: {name}").in_folder(one["folder"])
+        for name, one in data.items()
+    }

@@ -33,6 +33,7 @@ from studio.study.study_file import base_name, write_study
 
 OF_ANOTHER = "The folder holds a study of another set-up. {}. Choose another folder, or undo the change."
 NOT_AS_IT_IS = "it does not go on as it is set up now, which the Study workspace explains; what was measured is kept"
+NO_CELL = "no cell was done, and Run begins it again"
 SOMETHING = "Something that it is measured on has changed since"
 REST_MS = 250
 """Without a change before it is worked out what the study takes."""
@@ -57,9 +58,8 @@ class StudyWork(LongWork):
         """Estimates, and reading a folder."""
         self.watched = False
         """Someone looks at the estimate."""
-        self.loaded: dict[str, Project] = {}
-        """Base projects of a study that came from a file; empty: it is of the open project."""
-        self.draft: Data = self._begun()
+        self.draft, self.loaded = self._begun()
+        """loaded: base projects of a study that came from a file; empty: it is of the open project."""
         self.folder = self._kept_folder()
         self._document, self._changed = session.document, False
         """Of which the draft is, and whether it was changed in this window."""
@@ -184,6 +184,7 @@ class StudyWork(LongWork):
         """The draft asks its questions of the open project."""
         self.loaded = {name: base for name, base in self.loaded.items() if name != self.draft["base"]}
         self.loaded.pop(self.base_name, None)
+        self._document = self.session.document
         self.change(lambda draft: draft.update(base=self.base_name))
 
     def save(self, file: Path) -> bool:
@@ -307,7 +308,9 @@ class StudyWork(LongWork):
         self.unseen.run("read", "read the study", reading(folder), then)
 
     def _take(self, bases: dict[str, Project], draft: Data) -> None:
-        """Another study in place of this one."""
+        """Another study in place of this one, which is kept; the other is not before it is changed here."""
+        self._keep()
+        self._document, self._changed = self.session.document, False
         self.loaded, self.chosen = bases, 0
         self.folder, self.found, self.estimate, self._timed, self.failure = None, None, None, {}, ""
         self.draft = {"schema_version": 1, "name": "study", **draft}
@@ -335,8 +338,9 @@ class StudyWork(LongWork):
         self.look_ahead()
 
     def _how_on(self) -> str:
-        self._told_to_go_on = not self.problem
-        return NOT_AS_IT_IS if self.problem else super()._how_on()
+        begun = self.found is not None and bool(self.found.rows)
+        self._told_to_go_on = begun and not self.problem
+        return NOT_AS_IT_IS if self.problem else super()._how_on() if begun else NO_CELL
 
     def _said(self, error: InputError) -> str:
         return by_names(in_window(error), self.draft)
@@ -354,16 +358,18 @@ class StudyWork(LongWork):
             self._rest.start()
 
     def _follow_document(self) -> None:
-        """A study of the project that was open goes on, as it began; one that has not begun is of the new one."""
-        self._keep()  # of the document before, which may have become a file since the last change
-        self._document = self.session.document
+        """A study of the project that was open goes on, as it began, and is kept with that project; one that has not
+        begun is of the new one.
+        """
+        self._keep()  # the document before may have become a file since the last change
         if self.loaded:
             return
         if self.running or self.found is not None:
             self.loaded = dict(self.found.bases) if self.found is not None else self._run_bases
         else:
-            self._take({}, self._begun())
-            self._changed, self.folder = False, self._kept_folder()
+            draft, bases = self._begun()
+            self._take(bases, draft)
+            self.folder = self._kept_folder()
             self.state_changed.emit()
             if self.watched:
                 self.look()
@@ -372,12 +378,13 @@ class StudyWork(LongWork):
         path = self.session.document.path
         return kept_folder(path) if path is not None else None
 
-    def _begun(self) -> Data:
-        """The study of the open project as it was left, else an empty one."""
+    def _begun(self) -> tuple[Data, dict[str, Project]]:
+        """The study of the open project as it was left, with its own base projects, else an empty one."""
         path = self.session.document.path
-        return (kept_draft(path, self.base_name) if path is not None else None) or new_draft(self.base_name)
+        kept = kept_draft(path, self.base_name) if path is not None else None
+        return kept or (new_draft(self.base_name), {})
 
     def _keep(self) -> None:
         path = self._document.path
-        if path is not None and self._changed and not self.loaded:
-            keep_draft(path, self.draft, self.folder)
+        if path is not None and self._changed:
+            keep_draft(path, self.draft, self.folder, self.loaded)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from studio.project.project import Project
 from studio.study import kept_draft as module
 from studio.study.draft import Data, new_draft, new_sweep
 from studio.study.kept_draft import keep_draft, kept_draft
@@ -28,9 +29,20 @@ def test_it_is_there_again_by_the_name_that_the_project_has_now(tmp_path: Path) 
     project = tmp_path / "scanner.json"
     assert kept_draft(project, "scanner.json") is None
     keep_draft(project, draft())
-    assert kept_draft(project, "scanner.json") == draft()
-    assert kept_draft(tmp_path / "x" / ".." / "scanner.json", "other.json") == draft() | {"base": "other.json"}
+    assert kept_draft(project, "scanner.json") == (draft(), {})
+    assert kept_draft(tmp_path / "x" / ".." / "scanner.json", "other.json") == (
+        draft() | {"base": "other.json"},
+        {},
+    )
     assert kept_draft(tmp_path / "other.json", "other.json") is None
+
+
+def test_one_of_other_projects_keeps_them(tmp_path: Path) -> None:
+    """The study of a folder is edited beside a project that is another one."""
+    base = Project.load("plane")
+    keep_draft(tmp_path / "scanner.json", draft() | {"base": "plane"}, None, {"plane": base})
+    found = kept_draft(tmp_path / "scanner.json", "scanner.json")
+    assert found == (draft() | {"base": "plane"}, {"plane": base}) and found[1]["plane"].folder == base.folder
 
 
 def test_an_unfinished_one_is_kept_as_well(tmp_path: Path) -> None:
@@ -38,7 +50,7 @@ def test_an_unfinished_one_is_kept_as_well(tmp_path: Path) -> None:
     unfinished = draft()
     unfinished["sweeps"][0] |= {"chart": "map", "sampling": "boundary"}
     keep_draft(tmp_path / "scanner.json", unfinished)
-    assert kept_draft(tmp_path / "scanner.json", "scanner.json") == unfinished
+    assert kept_draft(tmp_path / "scanner.json", "scanner.json") == (unfinished, {})
 
 
 def test_an_emptied_one_is_gone(tmp_path: Path, folder: Path) -> None:

@@ -130,3 +130,40 @@ def test_a_project_saved_for_the_first_time_goes_on_with_the_study_that_it_had_b
     assert "Power: " in work.problem and "Base project" not in work.problem
     work.close()
     live(again).close()
+
+
+def test_a_study_of_other_results_that_is_edited_is_there_after_the_next_start(
+    desk: Desk, qtbot: QtBot, tmp_path: Path
+) -> None:
+    """Looked at alone, it takes nothing of the one before away."""
+    file = tmp_path / "plane.json"
+    desk.small([1.0, 2.0])
+    before = desk.work.draft
+    desk.work.load("quick")
+    desk.work.close()
+    for edited in (False, True):
+        if edited:
+            desk.work.change(lambda draft: draft.update(image_scale=0.1))
+            (tmp_path / "st3").mkdir()
+            desk.work.choose_folder(tmp_path / "st3")
+        again = Session(Document(Project.load(file), file))
+        work = one_of(StudyWork, again)
+        assert work.draft == (desk.work.draft if edited else before)
+        assert work.loaded == (desk.work.loaded if edited else {})
+        assert work.folder == (tmp_path / "st3" if edited else None)
+        live(again).close()
+
+
+def test_a_study_that_goes_on_beside_another_project_takes_nothing_of_that_one_s(
+    desk: Desk, qtbot: QtBot, tmp_path: Path
+) -> None:
+    desk.small([2.0])
+    desk.work.choose_folder(tmp_path / "out")
+    run(qtbot, desk)
+    other = tmp_path / "other.json"
+    desk.session.project.save(other)
+    desk.session.replace_document(Document(Project.load(other), other))
+    desk.small([2.0, 20.0])
+    again = Session(Document(Project.load(other), other))
+    assert one_of(StudyWork, again).sweep["vary"] == []
+    live(again).close()
