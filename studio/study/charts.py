@@ -38,7 +38,7 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
     with figure(3.4) as made:
         axes = made.subplots()
         draw(axes, answer, labels)
-        made.supxlabel(_repeats(answer), x=0.99, ha="right", fontsize=6.0, color=MUTED)
+        made.supxlabel(_repeats(answer), x=0.99, ha="right", fontsize=6.0, color=MUTED, wrap=True)
         for axis in (axes.xaxis, axes.yaxis):
             if axis.get_scale() == "log":  # matplotlib's own ticks are formulas
                 low, high = axis.get_view_interval()

@@ -12,6 +12,7 @@ from analysis.study.breakdown import EXTRA
 from studio.project.project import Project
 from studio.study.begin import study_bytes
 from studio.study.cells import cells_at, check_size, lattice_of, methods_of, next_cells, points
+from studio.study.small_images import small_image_doubts
 from studio.study.store import Row
 from studio.study.study import SEARCHES, Study
 from studio.study.tables import CALIBRATING, SECONDS, measured_cells
@@ -38,6 +39,8 @@ class Estimate:
     """Of the whole folder in the end."""
     steps: int = 1
     """Of the longest motion of its projects, of which every cell measures the first."""
+    doubts: tuple[str, ...] = ()
+    """What figures at its image scale are worth."""
 
 
 def estimate(
@@ -64,7 +67,8 @@ def estimate(
             seconds += taken
     size = study_bytes(study, len(rows) + cells + searched)
     steps = max(base.scene.frame_count for base in bases.values())
-    return Estimate(cells, renders, searched, None if math.isnan(seconds) else seconds, size, steps)
+    known = None if math.isnan(seconds) else seconds
+    return Estimate(cells, renders, searched, known, size, steps, small_image_doubts(study, bases))
 
 
 def costs(study: Study, bases: Mapping[str, Project], number: int) -> Costs:

@@ -26,8 +26,12 @@ class RunFoot(QWidget):
         self.run = text_button("Run…", name="primary")
         self.stop = text_button("Stop", stop_tip)
         self.bar = ShareBar()
-        self.stage = QLabel()
+        self.stage = QLabel(wordWrap=True)
         self.stage.setObjectName("muted")
+        self.stage.setMinimumWidth(1)
+        # what stands below keeps its place as the sentence gets longer
+        self.stage.setMinimumHeight(2 * self.stage.fontMetrics().lineSpacing())
+        self.stage.setAlignment(Qt.AlignmentFlag.AlignTop)
         where = QHBoxLayout()
         where.addWidget(self.folder, 1)
         where.addWidget(self.choose)

@@ -72,6 +72,8 @@ class StudyPanel(QWidget):
         self.time = text_button("Time it", "Measure one cell of each sweep, to tell how long the study takes")
         self.problem = QLabel(wordWrap=True)
         self.problem.setObjectName("error")
+        for label in (self.told, self.problem):
+            label.setMinimumWidth(1)  # the path of a folder is one long word
         self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         folder_tip = "Where the results go; a study that is there goes on"
         self.foot = RunFoot(folder_tip, "What is measured stays", [self.time])
@@ -96,7 +98,7 @@ class StudyPanel(QWidget):
         for box in (self.base, self.sweeps, self.repeats, self.scale):
             box.blockSignals(True)
         self.base.clear()
-        self.base.addItem(f"Open: {self.session.project.name}")
+        self.base.addItem(self._open_project())
         if draft["base"] in work.loaded:
             self.base.addItem(f"{draft['base'].replace('_', ' ')}, as in the study")
             self.base.setCurrentIndex(1)
@@ -108,6 +110,9 @@ class StudyPanel(QWidget):
         for box in (self.base, self.sweeps, self.repeats, self.scale):
             box.blockSignals(False)
         self.remove_sweep.setEnabled(len(draft["sweeps"]) > 1)
+
+    def _open_project(self) -> str:
+        return f"Open: {self.session.project.name}"
 
     def ask_and_run(self) -> None:
         """Ask for a folder where there is none yet, then run, go on or extend."""
@@ -195,6 +200,7 @@ class StudyPanel(QWidget):
         work.unseen.progress.connect(self._tell_timing)
         self.runner.progress.connect(self._tell_progress)
         self.session.document_replaced.connect(self.refresh)
+        self.session.project_changed.connect(lambda: self.base.setItemText(0, self._open_project()))
 
     def _tell_estimate(self) -> None:
         work, empty = self.work, varies_nothing(self.work.draft)
@@ -206,7 +212,6 @@ class StudyPanel(QWidget):
             self.told.setText("" if work.problem else EMPTY if empty else "Working out what it takes…")
         self.told.setObjectName("muted" if empty else "")
         self.told.style().polish(self.told)
-        self.time.setVisible(work.estimate is not None and work.estimate.seconds is None and not work.running)
         self._show_state()
 
     def _tell_timing(self, job: Job[object]) -> None:
@@ -223,6 +228,7 @@ class StudyPanel(QWidget):
         left = work.estimate is None or work.estimate.cells + work.estimate.searched > 0
         # what was worked out before a run is not what is left of it, which the foot tells
         self.told.setVisible(bool(self.told.text()) and not work.running)
+        self.time.setVisible(work.estimate is not None and work.estimate.seconds is None and not work.running)
         self.foot.show_state(work.folder, work.job, begun=there > 0 and left)
         self.foot.run.setEnabled(work.estimate is not None and left)
         self.foot.run.setToolTip(f"{there} cells are there; what is missing is measured" if there else "")
@@ -268,9 +274,9 @@ class StudyPanel(QWidget):
 
 
 def estimate_text(told: Estimate, processors: int) -> str:
-    """ "40 cells of 10 renders, about 2:10 on 2 processors, 0.3 MB"."""
+    """ "40 cells of 10 renders, about 2:10 on 2 processors, 0.3 MB", and what to know of figures at its scale."""
     if told.cells + told.searched == 0:
-        return "Every cell is measured."
+        return " ".join(["Every cell is measured.", *told.doubts])
     parts = [f"{told.cells} cells of {told.renders} renders"]
     if told.steps > 1:
         parts.append(f"step 1 of {told.steps} alone")
@@ -279,4 +285,4 @@ def estimate_text(told: Estimate, processors: int) -> str:
     if told.seconds is not None:
         parts.append(f"about {duration(told.seconds / processors)} on {processors} processors")
     parts.append(f"{told.bytes / 1e6:.1f} MB")
-    return ", ".join(parts)
+    return "\n".join([", ".join(parts), *told.doubts])

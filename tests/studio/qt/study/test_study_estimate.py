@@ -60,9 +60,12 @@ def test_while_it_runs_only_what_is_left_is_told(
     qtbot.waitUntil(lambda: panel.foot.run.isEnabled())
     assert panel.told.isVisible() and "cells of" in panel.told.text()
     work.start()
-    assert work.running and panel.told.isHidden()
+    assert work.running and panel.told.isHidden() and panel.time.isHidden()
+    said: list[str] = []
+    panel.session.message.connect(lambda _, text: said.append(text))
     work.stop()
     qtbot.waitUntil(lambda: not work.running and panel.told.isVisible())
+    assert panel.foot.run.text() == "Run" and "no cell was done, and Run begins it again" in said[-1]
 
 
 def test_an_estimate_that_is_passed_before_a_cell_is_done_is_said_to_be(panel: StudyPanel) -> None:
@@ -72,3 +75,31 @@ def test_an_estimate_that_is_passed_before_a_cell_is_done_is_said_to_be(panel: S
     assert "longer than the 41 s that were estimated" in panel.foot.stage.text()
     panel.foot.tell_progress(job, promised=100.0)
     assert "longer" not in panel.foot.stage.text()
+
+
+def test_what_a_small_image_makes_of_the_figures_is_told_before_it_runs(panel: StudyPanel, qtbot: QtBot) -> None:
+    def at(scale: float) -> str:
+        panel.work.change(lambda draft: draft.update(image_scale=scale))
+        qtbot.waitUntil(lambda: panel.work.study().image_scale == scale and not panel.work._rest.isActive())
+        qtbot.waitUntil(lambda: not panel.work.unseen.busy)
+        return panel.told.text()
+
+    assert "each pixel is 4 times as large" in at(0.25) and "not the scanner's" in panel.told.text()
+    assert "too thin for its methods" not in at(1.0) and "not the scanner's" not in panel.told.text()
+    assert "px wide there (sigma), too thin for its methods" in at(0.05)
+
+
+def test_no_sentence_widens_the_panel(panel: StudyPanel) -> None:
+    job: Job[object] = Job("study", lambda progress, cancelled: None)
+    before = panel.minimumSizeHint().width()
+    job.stage = "0 of 12 cells; the first ones are under way, or wait for their workers to start"
+    panel.foot.show_state(Path("/a"), job, begun=False)
+    panel.foot.tell_progress(job, promised=0.0)
+    panel.problem.setText("the store cannot be read: /" + 200 * "x")
+    panel.problem.show()
+    assert panel.minimumSizeHint().width() == before
+
+
+def test_the_open_project_has_its_new_name_as_soon_as_it_has_it(panel: StudyPanel) -> None:
+    assert panel.session.set(("name",), "p1")
+    assert panel.base.itemText(0) == "Open: p1"

@@ -1,0 +1,55 @@
+"""What figures of a study at another image scale are worth, told before it runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+
+from render.base.errors import InputError
+from studio.preview.preview import Preview
+from studio.preview.readouts import readouts
+from studio.project.project import Project
+from studio.scan.stages import scaled
+from studio.study.study import Study, with_fields
+
+THIN_PX = 0.4
+"""Sigma of a line, below which where it is within a pixel no longer shows in the pixels beside it."""
+
+
+def small_image_doubts(study: Study, bases: Mapping[str, Project]) -> tuple[str, ...]:
+    """That the figures are not the scanner's, and that the line is too thin there; nothing at the scanner's own scale.
+
+    Widths are of the base projects with what the study fixes, without what it varies.
+    """
+    scale = study.image_scale
+    if scale == 1.0:
+        return ()
+    each = f"each pixel is {1.0 / scale:.3g} times as large, and " if scale < 1.0 else ""
+    said = [f"At image scale {scale:.3g} {each}figures are not the scanner's: image scale 1 gives those."]
+    widths = []
+    for base in bases.values():
+        with suppress(InputError):  # told where the cells are counted
+            project = scaled(with_fields(base, study.set, "set"), scale)
+            widths.append(_width(project.to_text(), base.folder, study.laser))
+    known = [width for width in widths if width is not None]
+    if known and min(known) < THIN_PX:
+        said.append(
+            f"The line is {min(known):.2g} px wide there (sigma), too thin for its methods, which want {THIN_PX:g} px: "
+            "errors are much larger than by the scale alone."
+        )
+    return tuple(said)
+
+
+@lru_cache(maxsize=32)
+def _width(text: str, folder: Path, laser: int) -> float | None:
+    """Median sigma over the line, px, with the lens's blur; None: no line is in the image. text: of the project."""
+    project = Project.from_text(text, "study").in_folder(folder)
+    told = readouts(Preview().look(project, folder), laser)
+    if told.width_px is None:
+        return None
+    # the sigma of a disc along one direction is a quarter of its diameter
+    blur = told.blur_px.middle / 4.0 if told.blurs_images and told.blur_px is not None else 0.0
+    return math.hypot(told.width_px.middle, blur)
