@@ -8,15 +8,13 @@ from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
+from analysis.report.total import NARROW_PX
 from render.base.errors import InputError
 from studio.preview.preview import Preview
 from studio.preview.readouts import readouts
 from studio.project.project import Project
 from studio.scan.stages import scaled
 from studio.study.study import Study, with_fields
-
-THIN_PX = 0.4
-"""Sigma of a line, below which where it is within a pixel no longer shows in the pixels beside it."""
 
 
 def small_image_doubts(study: Study, bases: Mapping[str, Project]) -> tuple[str, ...]:
@@ -35,10 +33,10 @@ def small_image_doubts(study: Study, bases: Mapping[str, Project]) -> tuple[str,
             project = scaled(with_fields(base, study.set, "set"), scale)
             widths.append(_width(project.to_text(), base.folder, study.laser))
     known = [width for width in widths if width is not None]
-    if known and min(known) < THIN_PX:
+    if known and min(known) < NARROW_PX:
         said.append(
-            f"The line is {min(known):.2g} px wide there (sigma), too thin for its methods, which want {THIN_PX:g} px: "
-            "errors are much larger than by the scale alone."
+            f"The line is {min(known):.2g} px wide there (sigma), too thin for its methods, which want "
+            f"{NARROW_PX:g} px: errors are larger than by the scale alone."
         )
     return tuple(said)
 
