@@ -24,8 +24,8 @@ class Exposure(NamedTuple):
     @property
     def told(self) -> str:
         """A sentence."""
-        aim = f"the line's brightest pixels are aimed at {FILLED:.0%} of full scale"
-        return f"Exposure {Unit.of('s').with_unit(self.time)}: {aim}, {self.by}"
+        aim = f"the line's peaks, without noise and glints, are aimed at {FILLED:.0%} of full scale"
+        return f"Exposure {Unit.of('s').with_unit(self.time)}: {aim}, {self.by}; single pixels may be brighter"
 
 
 def filling(session: Session) -> Exposure | None:

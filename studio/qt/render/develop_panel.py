@@ -79,7 +79,7 @@ class DevelopPanel(QWidget):
         self.exposure.setToolTip("Exposure time: longer is brighter, until the line saturates.")
         self.automatic_exposure = text_button("Automatic")
         self.automatic_exposure.setToolTip(
-            f"The line's brightest pixels at {FILLED:.0%} of full: of the render at full scale, else as estimated"
+            f"The line's peaks, without noise, at {FILLED:.0%} of full: of the render at full scale, else as estimated"
         )
         self.automatic_gain = QCheckBox("full well fills the range")
         self.gain = LogField(1e-3, 100.0, 1.0, "DN/e-", 4)
@@ -386,11 +386,11 @@ class DevelopPanel(QWidget):
 
 
 def brightness(images: list[Image], names: list[str]) -> str:
-    """The brightest number of each image, and how much of it is saturated."""
+    """The brightest pixel of each image, be it the line's or not, and how much of it is saturated."""
     lines = []
     for image, name in zip(images, names or [""], strict=True):
         top, full = int(image.pixels.max()), float(np.mean(image.pixels >= image.saturation))
         saturated = f", {full:.2%} of the pixels saturated" if full > 0.0 else ""
         prefix = f"{name}: " if len(images) > 1 else ""
-        lines.append(f"{prefix}brightest {top} DN, {top / image.saturation:.0%} of full{saturated}")
+        lines.append(f"{prefix}brightest pixel of all {top} DN, {top / image.saturation:.0%} of full{saturated}")
     return "\n".join(lines)

@@ -56,20 +56,24 @@ def named(render: Render) -> str:
 
 def describe(render: Render) -> str:
     """Size, time and quality, in one line."""
-    ambient = render.frame.quality_of("ambient")
-    parts = [*_size_and_time(render), *_laser(render)]
+    ambient, settings = render.frame.quality_of("ambient"), render.project.render
+    asked = f" reached, {settings.laser_error:.2%} asked" if settings.goal is None else " reached by the depth's goal"
+    parts = [*_size_and_time(render), *(one + asked for one in _laser(render))]
     if ambient is not None:
         # fewer than each pixel was to have: the others take theirs from neighbours
-        few = ambient.work < render.project.render.ambient_samples
-        parts.append(f"ambient {_samples(ambient)} samples a pixel on average{', as most are interpolated' * few}")
+        few = ", as most are interpolated" * (ambient.work < settings.ambient_samples)
+        parts.append(
+            f"ambient {_samples(ambient)} samples a pixel reached on average, {settings.ambient_samples} asked{few}"
+        )
     return ", ".join(parts)
 
 
 def in_short(render: Render) -> list[str]:
     """The same in two lines that a narrow list has room for."""
     ambient = render.frame.quality_of("ambient")
-    quality = [*_laser(render), *([] if ambient is None else [f"ambient {_samples(ambient)} samples/px"])]
-    return [", ".join(_size_and_time(render)), ", ".join(quality)]
+    quality = [*_laser(render), *([] if ambient is None else [f"ambient {_samples(ambient)}/px"])]
+    reached = f"reached: {', '.join(quality)}" if quality else ""
+    return [", ".join(_size_and_time(render)), reached]
 
 
 def _samples(ambient: GroupQuality) -> str:

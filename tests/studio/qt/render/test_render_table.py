@@ -175,11 +175,16 @@ def test_the_list_tells_of_ambient_light_however_few_its_samples_are(qtbot: QtBo
     few = tuple(replace(one, work=0.2) if one.group == "ambient" else one for one in frame.quality)
     render = Render(1, small_project(), world, replace(frame, quality=few))
     assert frame.quality_of("ambient") is not None
-    assert "ambient 0.2 samples a pixel on average, as most are interpolated" in describe(render)
-    assert in_short(render)[1].endswith("ambient 0.2 samples/px")
+    asked = render.project.render.ambient_samples
+    told = f"ambient 0.2 samples a pixel reached on average, {asked} asked, as most are interpolated"
+    assert told in describe(render) and "% reached by the depth's goal" in describe(render)
+    without = replace(render, project=small_project().replaced({"render.goal": None}))
+    assert f"% reached, {without.project.render.laser_error:.2%} asked" in describe(without)
+    short = in_short(render)[1]
+    assert short.startswith("reached: laser ") and short.endswith("ambient 0.2/px"), "and not what was asked for"
     many = tuple(replace(one, work=16.0) if one.group == "ambient" else one for one in frame.quality)
     said = describe(replace(render, frame=replace(frame, quality=many)))
-    assert "ambient 16 samples a pixel on average" in said and "interpolated" not in said
+    assert "ambient 16 samples a pixel reached on average" in said and "interpolated" not in said
 
 
 def test_a_project_without_a_file_keeps_nothing(qtbot: QtBot) -> None:
