@@ -18,6 +18,7 @@ from studio.project.document import FieldPath, value_at
 from studio.project.project_files import in_project
 from studio.qt.core import theme
 from studio.qt.core.session import Session
+from studio.qt.core.widgets import bring_into_view
 from studio.qt.forms.fields import ChoiceField, TextField, reason, tool_button
 from studio.qt.forms.form_rows import LABEL_WIDTH, RESET_WIDTH, SPACING, Row
 from studio.qt.forms.pose_rows import PositionRow, RotationRow
@@ -138,6 +139,22 @@ class Form(QWidget):
                 row.mark(path in marked)
         for path, kind in self.kinds.items():
             kind.set_invalid(path in marked)
+
+    def go_to(self, path: FieldPath) -> None:
+        """The field at a path gets the focus, where it is seen; of one that has no field, the choice of its kind."""
+        at = self._shown_at(path)
+        shown: QWidget | None = self.rows[at][0].editor if at in self.rows else self.kinds.get(at)
+        if shown is None:
+            return
+        above = shown.parentWidget()
+        while above is not None and above is not self:
+            if isinstance(above, Section):
+                above.button.setChecked(True)
+            above = above.parentWidget()
+        parts = (shown, *shown.findChildren(QWidget))  # an editor may be several fields
+        field = next((one for one in parts if one.focusPolicy() != Qt.FocusPolicy.NoFocus), shown)
+        field.setFocus(Qt.FocusReason.OtherFocusReason)
+        bring_into_view(field)
 
     def _shown_at(self, path: FieldPath) -> FieldPath:
         while path and path not in self.rows and path not in self.kinds:

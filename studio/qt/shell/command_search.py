@@ -1,41 +1,55 @@
-"""Ctrl+P: everything that the menus can do, by a few typed letters."""
+"""Ctrl+P: everything that the menus can do, and every field of the project, by a few typed letters."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer
-from PySide6.QtGui import QAction, QColor, QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QDialog, QLineEdit, QListWidget, QListWidgetItem, QMainWindow, QMenu, QVBoxLayout
+from PySide6.QtGui import QColor, QKeyEvent, QKeySequence
+from PySide6.QtWidgets import QDialog, QLineEdit, QListWidget, QListWidgetItem, QMenu, QVBoxLayout
 
+from studio.project.document import FieldPath
 from studio.qt.core import theme
+from studio.qt.scene.scene_nodes import nodes
+from studio.qt.study.field_menu import named_fields
 from studio.runtime.word_search import found
 
-NOTHING = "Nothing found: no command has these letters"
+if TYPE_CHECKING:
+    from studio.qt.shell.window import MainWindow
+
+NOTHING = "Nothing found: no command and no field has these letters"
 SIZE = (560, 420)
 PASSED_ON = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 
 
 @dataclass(frozen=True)
 class Entry:
-    """An action, with the menus that lead to it: "Scene > Add"."""
+    """What can be chosen. text: as the list shows it, "Scene > Add > Sphere"; more: what tells of it besides."""
 
-    menu: str
     name: str
-    action: QAction
+    text: str
+    more: str
+    tip: str
+    possible: bool
+    act: Callable[[], object]
+    is_field: bool = False
 
 
 class CommandSearch(QDialog):
     """A line to type into above the list of what fits; Return does it."""
 
-    def __init__(self, window: QMainWindow) -> None:
+    def __init__(self, window: MainWindow) -> None:
         super().__init__(window)
         self.setObjectName("command-search")
-        self.setWindowTitle("Find a command")
+        self.setWindowTitle("Find a command or a field")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.entries = entries(window)
+        self.window_of = window
+        self.entries = [*entries(window), *field_entries(window)]
         self.line = QLineEdit()
-        self.line.setPlaceholderText("What to do: a few letters of each word")
+        self.line.setPlaceholderText("A command, or a field of the project: a few letters of each word")
         self.line.setClearButtonEnabled(True)
         self.list = QListWidget()
         self.list.setSpacing(2)
@@ -57,16 +71,16 @@ class CommandSearch(QDialog):
         """What fits, the best first."""
         self.list.clear()
         muted = QColor(theme.colours().muted)
-        texts = [(entry.name, f"{entry.menu} {entry.action.statusTip()}") for entry in self.entries]
+        texts = [(entry.name, entry.more) for entry in self.entries]
         for i in found(typed, texts):
             entry = self.entries[i]
-            keys = entry.action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
-            item = QListWidgetItem(f"{entry.menu} > {entry.name}" + (f"   {keys}" if keys else ""))
-            item.setToolTip(entry.action.statusTip())
+            if entry.is_field and not typed.strip():
+                continue  # hundreds of them would hide that these are all commands
+            item = QListWidgetItem(entry.text)
+            item.setToolTip(entry.tip if entry.possible else "Not possible just now")
             item.setData(Qt.ItemDataRole.UserRole, i)
-            if not entry.action.isEnabled():
+            if not entry.possible:
                 item.setForeground(muted)
-                item.setToolTip("Not possible just now")
             self.list.addItem(item)
         self.list.setCurrentRow(0)
         if self.list.count() == 0:
@@ -80,10 +94,10 @@ class CommandSearch(QDialog):
         number = None if item is None else item.data(Qt.ItemDataRole.UserRole)
         if number is None:
             return
-        action = self.entries[number].action
-        if action.isEnabled():
+        entry = self.entries[number]
+        if entry.possible:
             self.accept()
-            QTimer.singleShot(0, action, action.trigger)
+            QTimer.singleShot(0, self.window_of, entry.act)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Arrows in the line move through the list."""
@@ -94,7 +108,7 @@ class CommandSearch(QDialog):
         return super().eventFilter(watched, event)
 
 
-def entries(window: QMainWindow) -> list[Entry]:
+def entries(window: MainWindow) -> list[Entry]:
     """Every action of the window's menus; menus that are filled when they open are filled."""
     listed: list[Entry] = []
 
@@ -106,10 +120,29 @@ def entries(window: QMainWindow) -> list[Entry]:
             if isinstance(below, QMenu):
                 walk(below, f"{path} > {name}")
             elif name and not action.isSeparator():
-                listed.append(Entry(path, name, action))
+                keys = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
+                text, tip = f"{path} > {name}" + (f"   {keys}" if keys else ""), action.statusTip()
+                listed.append(Entry(name, text, f"{path} {tip}", tip, action.isEnabled(), action.trigger))
 
     for action in window.menuBar().actions():
         menu = action.menu()
         if isinstance(menu, QMenu):
             walk(menu, action.text().replace("&", ""))
     return listed
+
+
+def field_entries(window: MainWindow) -> list[Entry]:
+    """Every field of the inspector that holds one value, "Sensor: Laser speckle"; chosen, it has the focus."""
+    session = window.session
+
+    def go_to(item: FieldPath, path: FieldPath) -> None:
+        window.call_panel("inspector")
+        session.select(item)
+        window.panels["inspector"].form.go_to(path)  # type: ignore[attr-defined]
+
+    return [
+        Entry(name, f"{node.name}: {name}", node.name, spec.help, True, partial(go_to, node.path, path), True)
+        for node in nodes(session.project)
+        if node.path
+        for path, spec, name in named_fields(session.project, node.path)
+    ]

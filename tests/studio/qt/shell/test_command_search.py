@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from studio.qt.forms.form import Section
 from studio.qt.shell.command_search import CommandSearch
 from studio.qt.shell.window import MainWindow
 
@@ -39,3 +40,21 @@ def test_a_command_that_is_not_possible_now_stays_undone(window: MainWindow, qtb
     search.list.setCurrentRow(0)
     search.choose()
     assert search.isVisible() is False and window.session.project is before
+
+
+def test_a_field_is_found_by_a_few_letters_and_has_the_focus(window: MainWindow, qtbot: QtBot) -> None:
+    search = CommandSearch(window)
+    assert not any(": " in search.list.item(i).text() for i in range(search.list.count()))
+    search.show_found("speckle")
+    texts = [search.list.item(i).text() for i in range(search.list.count())]
+    row = texts.index("Sensor: Laser speckle")
+    search.list.setCurrentRow(row)
+    Section.folded = dict.fromkeys(("Sensor", "Noise", "Laser speckle"), True)
+    window.session.select(())
+    search.choose()
+    form = window.panels["inspector"].form  # type: ignore[attr-defined]
+    qtbot.waitUntil(lambda: window.session.selection == ("sensor",))
+    field = form.rows[("sensor", "speckle")][0].editor
+    qtbot.waitUntil(lambda: window.focusWidget() is field or field.isAncestorOf(window.focusWidget()))
+    Section.folded = {}
+    qtbot.waitUntil(field.isVisible)
