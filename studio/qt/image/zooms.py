@@ -37,6 +37,7 @@ class Zooms(QWidget):
         self.more.setMenu(self.menu)
         self.more.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         row.addWidget(self.more)
+        self.setMinimumWidth(self.more.sizeHint().width())  # two buttons must not widen a window that has no room
         self.spread(True)
         view.scene().sigMouseClicked.connect(self._open)
 
