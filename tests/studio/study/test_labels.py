@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,17 @@ def test_a_chart_has_the_inspectors_name_and_unit() -> None:
     assert sorted(places(answer)[:, 0]) == [1.0, 2.3]
     assert any(np.allclose(line.get_xdata(), [1.0, 2.3]) for line in axes.lines if len(line.get_xdata()) == 2)
     assert [row[0] for row in table(answer)] == ["1", "2.3"]
+
+
+def test_the_foot_of_a_narrow_chart_wraps_and_is_not_cut() -> None:
+    study, bases, rows = measured({"field": EXPOSURE, "values": [0.001, 0.0023]})
+    answer, labels = read(study, bases, rows)
+    made = chart(replace(answer, image_scale=0.1), labels)
+    made.set_size_inches(2.0, 2.0)
+    made.canvas.draw()
+    foot = made._supxlabel.get_window_extent()
+    assert "not the scanner's own figures" in made._supxlabel.get_text()
+    assert foot.x0 >= 0.0 and foot.x1 <= made.bbox.width
 
 
 @pytest.mark.parametrize("high", [0.0014, 0.004, 0.02])
