@@ -89,7 +89,7 @@ def test_what_a_small_image_makes_of_the_figures_is_told_before_it_runs(panel: S
     assert "px wide there (sigma), too thin for its methods" in at(0.05)
 
 
-def test_no_sentence_widens_the_panel(panel: StudyPanel) -> None:
+def test_no_sentence_widens_the_panel(panel: StudyPanel, qtbot: QtBot) -> None:
     job: Job[object] = Job("study", lambda progress, cancelled: None)
     before = panel.minimumSizeHint().width()
     job.stage = "0 of 12 cells; the first ones are under way, or wait for their workers to start"
@@ -97,6 +97,7 @@ def test_no_sentence_widens_the_panel(panel: StudyPanel) -> None:
     panel.foot.tell_progress(job, promised=0.0)
     panel.problem.setText("the store cannot be read: /" + 200 * "x")
     panel.problem.show()
+    qtbot.wait(50)  # a layout hears of it by an event
     assert panel.minimumSizeHint().width() == before
 
 
