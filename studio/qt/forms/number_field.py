@@ -183,7 +183,8 @@ class NumberField(TextField):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
-        if self.suffix:
+        # "no line" is no number of degrees
+        if self.suffix and (self.text() or not self.placeholderText()):
             painter = QPainter(self)
             painter.setPen(self.palette().color(QPalette.ColorRole.PlaceholderText))
             area = self.rect().adjusted(0, 0, -6, 0)
