@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.calibration.adjust import Prior
-from analysis.calibration.checks import Halves, LensTrial, Whiteness, choose_lens, halves, whiteness
+from analysis.calibration.checks import Halves, Whiteness, halves, whiteness
 from analysis.calibration.circles import centre_bias
 from analysis.calibration.degenerate import complaints
 from analysis.calibration.depth import DepthError, depth_error, working_volume
 from analysis.calibration.estimate import Estimate, free_parameters
+from analysis.calibration.lens_choice import LensTrial, choose_lens
 from analysis.calibration.motion import Motion, Told, started, turned_about
 from analysis.calibration.next_pose import Advice, advise
 from analysis.calibration.observations import Observations, View, gather

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from analysis.calibration.calibrate import Calibrated
-from analysis.calibration.checks import LensTrial
 from analysis.calibration.estimate import unit_plane
+from analysis.calibration.lens_choice import PROOF, LensTrial
 from analysis.calibration.next_pose import Advice
 from analysis.calibration.recheck import Part, Recheck
 from studio.calibration.motion_file import motion_rows
 
-LEAST_SHOWN = 0.05
-"""Standard errors that would be written as none."""
 SMALL_GAIN = 0.03
 """Of the depth error: what one more view should take off it to be worth while."""
 
@@ -88,18 +86,21 @@ def check_rows(result: Calibrated, views: int) -> list[tuple[str, str]]:
 
 
 def lens_sentence(terms: int, trials: Sequence[LensTrial]) -> str:
-    """Which lens was chosen, and how every lens that was tried did at views that it was not fitted to."""
+    """Which lens was chosen and why, and how every lens that was tried did at views that it was not fitted to."""
+    best = min(trials, key=lambda one: one.held_out)
     tried = "; ".join(
-        f"{one.terms}: {one.held_out:.3g}"
+        f"{one.terms}: {one.held_out:.4g}"
         + (f" and {1e6 * one.depth:.0f} um" if one.depth else "")
         + (", chosen" if one.terms == terms else "")
-        + (f", {one.worse_by:.1f} se worse" if one.worse_by >= LEAST_SHOWN else "")
+        + (", the best" if one is best else "")
+        + (f", p = {one.p:.1g}" if one is not trials[-1] else "")
         for one in trials
     )
-    # each may be the best at corners and not in depth
-    alike = min(one.worse_by for one in trials) <= 1.0
-    which = "the fewest within one standard error (se) of" if alike else "the closest to"
-    return f"{terms} distortion terms, {which} the best on held-out views ({tried})"
+    return (
+        f"{terms} distortion terms, the fewest to which none with more is proved better (p under {PROOF:g}) by the "
+        f"corners of views that were held out; their mean squared residual{' and depth' if best.depth else ''}, and p "
+        f"that noise alone makes one with more terms seem as good as found: {tried}"
+    )
 
 
 def next_sentence(advice: Advice, target_um: float | None) -> str:

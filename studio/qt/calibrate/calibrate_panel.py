@@ -81,7 +81,9 @@ class CalibratePanel(QWidget):
             "<p>What is found; lasers alone need the calibration file of a camera, and one to three new photographs "
             "tell whether a calibration file still holds</p>"
         )
-        self.lens.setToolTip("How many terms the lens has; by held-out views: the fewest that are not worse")
+        self.lens.setToolTip(
+            "How many terms the lens has; by held-out views: the fewest that none with more is proved better than"
+        )
         for text, holds in CARRIED:
             self.carried.addItem(text, holds)
         self.carried.setToolTip(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +11,7 @@ import pytest
 from analysis.calibration import robust
 from analysis.calibration.adjust import Prior, adjust, view_information
 from analysis.calibration.calibrate import Request, calibrate
-from analysis.calibration.checks import Halves, choose_lens, halves, whiteness
+from analysis.calibration.checks import Halves, halves, whiteness
 from analysis.calibration.degenerate import complaints
 from analysis.calibration.depth import depth_error, depth_jacobian, working_volume
 from analysis.calibration.estimate import Estimate, free_parameters
@@ -123,32 +122,6 @@ def test_a_lens_that_is_not_as_modelled_is_told_and_a_good_one_is_not() -> None:
     assert alarms <= 3 and missed == 0  # of 12 at 5 %: four or more come once in 500
     for p in (p_halves, p_white):  # uniform: the mean of 12 has a standard deviation of 0.083
         assert np.min(p) > 1e-3 and 0.25 < np.mean(p) < 0.75
-
-
-@pytest.fixture(scope="module")
-def of_four_terms() -> tuple[Estimate, list[View]]:
-    """A camera whose lens has four terms, and twelve views by it."""
-    there = replace(truth(6, 12), distortion=np.array([-0.1, 0.1, 0.0, 0.0]))
-    there = replace(there, intrinsics=np.array([1800.0, 1800.0, 1223.5, 1023.5]))
-    views = [exact_view(f"view {i}", there, i, target(), SIZE, laser_step=128) for i in range(12)]
-    return there, noisy(views, np.random.default_rng(7))
-
-
-def test_the_fewest_terms_that_do_are_chosen(of_four_terms: tuple[Estimate, list[View]]) -> None:
-    there, views = of_four_terms
-    terms, trials = choose_lens(gather(views, EXTENT), there)
-    assert terms == 4
-    assert trials[0].terms == 0 and trials[0].worse_by > 3.0
-    # a pixel is z^2 / (f b) of depth, some 2 mm here, of which the line's noise is 0.05 and its median two thirds
-    pixel = 0.85**2 / (1800.0 * 0.2)
-    assert 0.3 * 0.05 * pixel < trials[1].depth < 1.5 * 0.05 * pixel < trials[0].depth
-
-
-@pytest.mark.validation
-def test_they_are_chosen_beside_a_line_that_is_wrong(of_four_terms: tuple[Estimate, list[View]]) -> None:
-    there, views = deepcopy(of_four_terms)
-    views[3].stripes[0].pixel[:, 0] += 30.0
-    assert choose_lens(gather(views, EXTENT), there)[0] == 4
 
 
 @pytest.mark.parametrize(("given", "sentence"), DEGENERATE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.calibration.checks import LensTrial
+from analysis.calibration.lens_choice import LensTrial
 from render.base.errors import InputError
 from studio.calibration.board_text import parse_board
 from studio.calibration.in_silico import virtual_views
@@ -13,21 +13,24 @@ from studio.project.project import Project
 from studio.project.templates import template_folder
 
 
-def test_the_lens_that_is_passed_over_is_told_to_be_worse_and_by_how_much() -> None:
-    trials = [LensTrial(0, 1.2, 43e-6, 2.4), LensTrial(4, 1.1, 41e-6, 0.6), LensTrial(5, 1.09, 42e-6, 0.0)]
+def test_the_lens_is_told_with_why_it_was_chosen_and_which_was_the_best() -> None:
+    trials = [LensTrial(0, 1.2, 43e-6, 2e-5), LensTrial(4, 1.1, 41e-6, 0.6), LensTrial(5, 1.09, 42e-6, 1.0)]
     assert lens_sentence(4, trials) == (
-        "4 distortion terms, the fewest within one standard error (se) of the best on held-out views "
-        "(0: 1.2 and 43 um, 2.4 se worse; 4: 1.1 and 41 um, chosen, 0.6 se worse; 5: 1.09 and 42 um)"
+        "4 distortion terms, the fewest to which none with more is proved better (p under 0.05) by the corners of "
+        "views that were held out; their mean squared residual and depth, and p that noise alone makes one with more "
+        "terms seem as good as found: 0: 1.2 and 43 um, p = 2e-05; 4: 1.1 and 41 um, chosen, p = 0.6; "
+        "5: 1.09 and 42 um, the best"
     )
 
 
-def test_where_no_lens_is_the_best_at_corners_and_in_depth_the_closest_is_told() -> None:
-    trials = [LensTrial(0, 1.2, 43e-6, 1.4), LensTrial(4, 1.1, 48e-6, 3.0)]
-    assert lens_sentence(0, trials).startswith("0 distortion terms, the closest to the best on held-out views (0")
+def test_a_lens_without_terms_may_be_the_best_itself() -> None:
+    trials = [LensTrial(0, 0.959, 42e-6, 0.7), LensTrial(4, 0.964, 41e-6, 0.4), LensTrial(5, 0.975, 42e-6, 1.0)]
+    assert "0: 0.959 and 42 um, chosen, the best, p = 0.7; 4: 0.964" in lens_sentence(0, trials)
 
 
 def test_without_a_laser_no_depth_is_told() -> None:
-    assert lens_sentence(0, [LensTrial(0, 0.98, 0.0, 0.0)]).endswith("(0: 0.98, chosen)")
+    told = lens_sentence(0, [LensTrial(0, 0.98, 0.0, 1.0)])
+    assert told.endswith("0: 0.98, chosen, the best") and "depth" not in told and " um" not in told
 
 
 def test_a_board_that_no_place_shows_is_not_told_as_found() -> None:
