@@ -162,7 +162,7 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
             request.size,
             usable,
             most_tilt=request.most_tilt,
-            sigmas=typical,
+            sigmas=(typical[0], typical[1] / np.sqrt(_density(adjusted.seen))),
         )
     return Calibrated(
         adjusted,
@@ -262,3 +262,13 @@ def _typical_sigma(adjusted: Adjusted) -> tuple[float, float]:
     line = seen.laser_weight[seen.laser_weight > 0.0]
     corner = np.abs(np.linalg.det(seen.whitening[used])) ** -0.5
     return float(np.median(corner)), float(np.median(1.0 / line)) if len(line) else 0.05
+
+
+def _density(seen: Observations) -> float:
+    """Laser points a scan line, as far as the lines reach."""
+    used = seen.laser_weight > 0.0
+    view, laser, pixel = seen.laser_view[used], seen.laser[used], seen.laser_pixel[used]
+    place = np.take_along_axis(pixel, (1 - seen.along[used])[:, None], axis=1)[:, 0]
+    same = (np.diff(view) == 0) & (np.diff(laser) == 0)
+    reach = float(np.sum(np.abs(np.diff(place))[same]))
+    return float(np.count_nonzero(same)) / reach if reach > 0.0 else 1.0

@@ -2,7 +2,8 @@
 
 A view adds information I to the shared parameters; with covariance C before, it is (C^-1 + I)^-1 after. The variance of
 depth, averaged over the volume, is the trace of that with the depth's derivatives, so that hundreds of poses are tried
-in a tenth of a second: first some everywhere, then ever closer about the best one.
+in a tenth of a second: first some everywhere, then ever closer about the best one. What is told of that one is worked
+out with all the corners and as many laser points as the views so far have.
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ ROUNDS, ABOUT = 3, 48
 """Searches about the best pose so far, each over so many poses half as far away as the one before."""
 CORNERS = 5
 """Corners a side of the board that stand for all of them in a trial."""
-POINTS = 24
-"""Laser points a line that stand for all of them."""
+POINTS, MANY_POINTS = 24, 480
+"""Laser points a line that stand for all of them, in a trial and in what is told of the best pose."""
+LEAST_SEEN = 0.24
+"""Share of the corners that a view must show to tell anything."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,8 @@ def advise(
     most_tilt: float = np.radians(45.0),
     sigmas: tuple[float, float] = (0.05, 0.05),
 ) -> Advice:
-    """information (p, p) of the views so far; target (n, 2) m; most_tilt rad; sigmas px of corners and line.
+    """information (p, p) of the views so far; target (n, 2) m; most_tilt rad; sigmas px of a corner, and of the
+    line at each scan line.
 
     Distances are those of the volumes.
     """
@@ -74,8 +78,13 @@ def advise(
     weight = _depth_weight(estimate, volumes)[np.ix_(used, used)] * both
     before = float(np.sum(np.linalg.inv(inner * both) * weight))
 
-    def left(poses: Estimate) -> Float:
-        told = _information(poses, target, size, sigmas)[:, used][:, :, used]
+    least, greatest = target.min(axis=0), target.max(axis=0)
+    x, y = np.meshgrid(*(np.linspace(least[i], greatest[i], CORNERS) for i in (0, 1)))
+    few = np.column_stack([x.ravel(), y.ravel()])
+
+    def left(poses: Estimate, corners: Float = few, points: int = POINTS) -> Float:
+        weight_of_one = np.sqrt(len(target) / len(corners)) / sigmas[0]
+        told = _information(poses, corners, points, size, (weight_of_one, 1.0 / sigmas[1]))[:, used][:, :, used]
         return np.asarray(np.einsum("kij,ji->k", np.linalg.inv((inner + told) * both), weight))
 
     poses, rng = _candidates(estimate, middle, ends, most_tilt), np.random.default_rng(0)
@@ -85,9 +94,10 @@ def advise(
         found = left(near)
         if found.min() < after.min():
             poses, after = near, found
-    best = int(np.argmin(after))
-    centre = poses.rotation[best] @ np.append(target.mean(axis=0), 0.0) + poses.translation[best]
-    return Advice(poses.rotation[best], centre, float(np.sqrt(before)), float(np.sqrt(max(after[best], 0.0))))
+    best = _one(poses, int(np.argmin(after)))
+    centre = best.rotation[0] @ np.append(target.mean(axis=0), 0.0) + best.translation[0]
+    reached = float(left(best, target, MANY_POINTS)[0])
+    return Advice(best.rotation[0], centre, float(np.sqrt(before)), float(np.sqrt(max(reached, 0.0))))
 
 
 def _depth_weight(estimate: Estimate, volumes: list[Volume]) -> Float:
@@ -135,38 +145,42 @@ def _about(
     return pose.with_poses(turned, place - turned @ middle)
 
 
-def _information(poses: Estimate, target: Float, size: tuple[int, int], sigmas: tuple[float, float]) -> Float:
-    """(poses, p, p); a few corners and laser points stand for all, with their information."""
-    least, greatest = target.min(axis=0), target.max(axis=0)
+def _information(
+    poses: Estimate, corners: Float, points: int, size: tuple[int, int], weights: tuple[float, float]
+) -> Float:
+    """(poses, p, p) of views with corners (n, 2) m and so many laser points a line.
+
+    weights: 1/px of a corner, and of the line at each scan line.
+    """
+    least, greatest = corners.min(axis=0), corners.max(axis=0)
     count = len(poses.rotation)
-    x, y = np.meshgrid(*(np.linspace(least[i], greatest[i], CORNERS) for i in (0, 1)))
-    few = np.tile(np.column_stack([x.ravel(), y.ravel()]), (count, 1))
-    view = np.repeat(np.arange(count), CORNERS**2)
-    pixel, seen = _pixels(poses, view, few, size)
-    corner = np.sqrt(len(target) / CORNERS**2) / sigmas[0]
-    numbers, lasers = np.repeat(np.arange(count), POINTS), range(len(poses.planes))
+    all_corners = np.tile(corners, (count, 1))
+    view = np.repeat(np.arange(count), len(corners))
+    pixel, seen = _pixels(poses, view, all_corners, size)
+    numbers, lasers = np.repeat(np.arange(count), points), range(len(poses.planes))
     laser_view = np.concatenate([np.empty(0, dtype=np.intp), *(numbers for _ in lasers)])
     laser = np.repeat(np.arange(len(poses.planes)), len(numbers))
-    line = np.concatenate([np.empty((0, 2)), *(_line(poses, m, least, greatest).reshape(-1, 2) for m in poses.planes)])
+    lines = [_line(poses, m, least, greatest, points).reshape(-1, 2) for m in poses.planes]
+    line = np.concatenate([np.empty((0, 2)), *lines])
     on = np.all((line >= least) & (line <= greatest), axis=1)
     line_pixel, line_seen = _pixels(poses, laser_view, line, size)
     along = np.array([0 if abs(m[0]) >= abs(m[1]) else 1 for m in poses.planes], dtype=np.intp)[laser]
     # each point stands for the scan lines up to the next
-    ends = line_pixel.reshape(-1, POINTS, 2)
-    rows = np.abs(np.nan_to_num(ends[:, -1] - ends[:, 0])) / (POINTS - 1)
-    rows = np.repeat(rows, POINTS, axis=0)[np.arange(len(along)), 1 - along]
+    ends = line_pixel.reshape(-1, points, 2)
+    rows = np.abs(np.nan_to_num(ends[:, -1] - ends[:, 0])) / (points - 1)
+    rows = np.repeat(rows, points, axis=0)[np.arange(len(along)), 1 - along]
     middle = 0.5 * (least + greatest)
     trial = Observations(
         names=("",) * count,
         lasers=len(poses.planes),
         view=view,
         pixel=pixel,
-        target=few,
-        whitening=np.eye(2) * (corner * seen)[:, None, None],
+        target=all_corners,
+        whitening=np.eye(2) * (weights[0] * seen)[:, None, None],
         laser_view=laser_view,
         laser=laser,
         laser_pixel=np.nan_to_num(line_pixel),
-        laser_weight=np.where(on & line_seen, np.sqrt(rows) / sigmas[1], 0.0),
+        laser_weight=np.where(on & line_seen, np.sqrt(rows) * weights[1], 0.0),
         along=along,
         centre=middle,
         half=0.5 * (greatest - least),
@@ -180,20 +194,20 @@ def _information(poses: Estimate, target: Float, size: tuple[int, int], sigmas: 
             for name in ("laser_view", "laser", "laser_pixel", "laser_weight", "along")
         },
     )
-    enough = np.bincount(view, weights=seen, minlength=count) >= 6
+    enough = np.bincount(view, weights=seen, minlength=count) >= LEAST_SEEN * len(corners)
     out = view_information(trial, poses, start=_rays(poses, laser_view[order], line[order]))
     return np.where(enough[:, None, None], out, 0.0)
 
 
-def _line(poses: Estimate, m: Float, least: Float, greatest: Float) -> Float:
-    """(poses, POINTS, 2) m, places on each board's plane along the laser's line, over the board's diagonal."""
+def _line(poses: Estimate, m: Float, least: Float, greatest: Float, points: int) -> Float:
+    """(poses, points, 2) m, places on each board's plane along the laser's line, over the board's diagonal."""
     across = np.einsum("kij,i->kj", poses.rotation, m)[:, :2]
     offset = 1.0 - poses.translation @ m
     middle = 0.5 * (least + greatest)
     squared = np.maximum(np.sum(across**2, axis=1), 1e-12)
     foot = middle + across * ((offset - across @ middle) / squared)[:, None]
     direction = np.column_stack([-across[:, 1], across[:, 0]]) / np.sqrt(squared)[:, None]
-    reach = 0.5 * np.linalg.norm(greatest - least) * np.linspace(-1.0, 1.0, POINTS)
+    reach = 0.5 * np.linalg.norm(greatest - least) * np.linspace(-1.0, 1.0, points)
     return np.asarray(foot[:, None, :] + reach[None, :, None] * direction[:, None, :])
 
 

@@ -10,6 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
+from studio.calibration import material
 from studio.calibration.exchange import read_camera
 from studio.qt.calibrate.board_view import COVERAGE, DEPTH, NEXT, RESIDUALS
 from studio.qt.calibrate.keeping import FORMS, save, use, use_file
@@ -118,8 +119,9 @@ class TestPictures:
         assert len(solved.session.ghost) == 0
 
     def test_a_virtual_board_is_held_where_it_is_advised_and_depth_is_known_better(
-        self, qtbot: QtBot, solved: Desk
+        self, qtbot: QtBot, solved: Desk, monkeypatch: pytest.MonkeyPatch
     ) -> None:
+        monkeypatch.setattr(material, "LASER_STEP", 64)  # as the other views have it
         work = solved.work
         assert work.solved is not None
         before = work.solved.result
@@ -131,8 +133,8 @@ class TestPictures:
         now = work.solved.result
         assert solved.panel.views.rowCount() == VIEWS + 1 and now.adjusted.seen.count == VIEWS + 1
         assert now.estimate.rotation[-1] == pytest.approx(advice.rotation, abs=2e-3)
-        # a line of a virtual board has a point on every eighth row, and the advice counts on one on each
-        assert 0.6 < (before.depth[0].rms - now.depth[0].rms) / advice.gain < 1.1
+        # the other views' noise, which 8 views let into the estimate, is in neither alike
+        assert (before.depth[0].rms - now.depth[0].rms) / advice.gain == pytest.approx(1.0, abs=0.1)
 
     def test_what_is_not_asked_for_reads_as_a_sentence(self, solved: Desk) -> None:
         panel = solved.panel
