@@ -44,6 +44,8 @@ class Material:
     """Of views, each with its name."""
     told: Told | None = None
     """Of a motion that carried the board."""
+    names: tuple[str, ...] = ()
+    """Of the lasers, where they are those of a project."""
 
     def without(self, names: Collection[str]) -> Material:
         """The same without some views."""
@@ -138,7 +140,8 @@ def virtual(
         more, truth, told = moved
         views += more
     camera = project.scene.camera
-    return Material(tuple(views), (camera.width, camera.height), len(project.scene.lasers), told=told), truth
+    names = tuple(laser.name for laser in project.scene.lasers)
+    return Material(tuple(views), (camera.width, camera.height), len(names), told=told, names=names), truth
 
 
 def as_advised(material: Material, truth: Estimate, advice: Advice, board: Board) -> Material:

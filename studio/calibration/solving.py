@@ -34,6 +34,8 @@ class Solved:
     size: tuple[int, int]
     views: int
     """That it was made from, those left out as strays as well."""
+    names: tuple[str, ...] = ()
+    """Of the lasers, where they are those of a project."""
 
 
 def solve(
@@ -45,7 +47,7 @@ def solve(
     rows = view_rows(material.views, dropped, material.notes, result, board.target)
     true = None if truth is None else tuple(true_depth_error(result, truth))
     maps = tuple(depth_map(one, result.estimate) for one in result.depth)
-    return Solved(result, tuple(rows), maps, true, board, material.size, len(kept.views))
+    return Solved(result, tuple(rows), maps, true, board, material.size, len(kept.views), material.names)
 
 
 def of_project(data: dict[str, Any]) -> Calibration:

@@ -17,8 +17,13 @@ SMALL_GAIN = 0.03
 """Of the depth error: what one more view should take off it to be worth while."""
 
 
-def parameter_rows(result: Calibrated) -> list[tuple[str, str, str]]:
-    """Name, value and sigma of everything that was estimated."""
+def laser_name(number: int, names: Sequence[str] = ()) -> str:
+    """As the project calls it, else its number."""
+    return names[number] if number < len(names) else f"laser {number}"
+
+
+def parameter_rows(result: Calibrated, names: Sequence[str] = ()) -> list[tuple[str, str, str]]:
+    """Name, value and sigma of everything that was estimated; names of the lasers."""
     estimate, covariance = result.estimate, result.adjusted.solution.covariance
     sigma = np.sqrt(np.diag(covariance))
     rows = []
@@ -30,10 +35,11 @@ def parameter_rows(result: Calibrated) -> list[tuple[str, str, str]]:
         a, b, c, d = unit_plane(m)
         own = estimate.plane_slice(i)
         along = np.linalg.eigvalsh(covariance[own, own])[-1] ** 0.5 / np.linalg.norm(m)
-        rows.append((f"laser {i}: normal", f"{a:.6f} {b:.6f} {c:.6f}", f"{1e3 * along:.2g} mrad"))
+        laser = laser_name(i, names)
+        rows.append((f"{laser}: normal", f"{a:.6f} {b:.6f} {c:.6f}", f"{1e3 * along:.2g} mrad"))
         by_d = m / np.linalg.norm(m) ** 3
         rows.append(
-            (f"laser {i}: distance mm", f"{-1e3 * d:.4f}", f"{1e3 * np.sqrt(by_d @ covariance[own, own] @ by_d):.2g}")
+            (f"{laser}: distance mm", f"{-1e3 * d:.4f}", f"{1e3 * np.sqrt(by_d @ covariance[own, own] @ by_d):.2g}")
         )
     rows += motion_rows(result)
     warp = 1e6 * estimate.warp
@@ -45,13 +51,15 @@ def parameter_rows(result: Calibrated) -> list[tuple[str, str, str]]:
     return rows
 
 
-def depth_rows(result: Calibrated, true: list[tuple[float, float]] | None) -> list[tuple[str, ...]]:
+def depth_rows(
+    result: Calibrated, true: list[tuple[float, float]] | None, names: Sequence[str] = ()
+) -> list[tuple[str, ...]]:
     """For each laser: rms and greatest systematic error, that of the line's noise, and the true one if known; um."""
     rows = []
     for i, one in enumerate(result.depth):
         random = float(np.sqrt(np.mean(one.random**2)))
         cells = [one.rms, float(one.systematic.max()), random] + ([true[i][0]] if true else [])
-        span = f"laser {one.volume.laser}, {one.volume.depth.min():.3g} to {one.volume.depth.max():.3g} m"
+        span = f"{laser_name(one.volume.laser, names)}, {one.volume.depth.min():.3g} to {one.volume.depth.max():.3g} m"
         rows.append((span, *(f"{1e6 * cell:.1f}" for cell in cells)))
     return rows
 

@@ -244,11 +244,11 @@ def _print(
 ) -> None:
     from studio.calibration.words import check_rows, depth_rows, next_sentence, parameter_rows
 
-    print_table("Calibration", parameter_rows(result), header=("parameter", "value", "sigma"))
+    print_table("Calibration", parameter_rows(result, material.names), header=("parameter", "value", "sigma"))
     if result.depth:
         print()
         header = ("depth error", "calibration um", "worst um", "line um", *(("true um",) if true else ()))
-        print_table("Depth over the working volume (rms)", depth_rows(result, true), header=header)
+        print_table("Depth over the working volume (rms)", depth_rows(result, true, material.names), header=header)
     print()
     print_table("Checks", check_rows(result, len(material.views)))
     for fault in result.faults:

@@ -65,7 +65,8 @@ class BoardView(QWidget):
         self.work = one_of(CalibrationWork, session)
         one_of(Ghost, session)
         self.runner = JobRunner(self)
-        self.tabs = QTabBar(expanding=False, usesScrollButtons=True, elideMode=Qt.TextElideMode.ElideRight)
+        # tabs without room scroll, as their first letters would not tell them apart
+        self.tabs = QTabBar(expanding=False, usesScrollButtons=True, elideMode=Qt.TextElideMode.ElideNone)
         self.tabs.setDrawBase(False)
         for title, tip in TABS:
             self.tabs.setTabToolTip(self.tabs.addTab(title), tip)
@@ -113,7 +114,7 @@ class BoardView(QWidget):
             return
         solved, tab = self.work.solved, self.tabs.currentIndex()
         depths = () if solved is None else solved.result.depth
-        self._fill_lasers([one.volume.laser for one in depths])
+        self._fill_lasers([self._name(one.volume.laser) for one in depths])
         self.laser.setVisible(tab == DEPTH and len(depths) > 1)
         self.fit.setVisible(tab != DEPTH)
         shot = self.work.shot()
@@ -237,13 +238,18 @@ class BoardView(QWidget):
         assert solved is not None
         one = solved.result.depth[number]
         self.plot.show_map(solved.maps[number])
+        name = self._name(one.volume.laser)
         self.caption.setText(
-            f"Laser {one.volume.laser}: depth errs by {1e6 * one.rms:.1f} µm rms, where it is worst by "
+            f"{name[0].upper()}{name[1:]}: depth errs by {1e6 * one.rms:.1f} µm rms, where it is worst by "
             f"{1e6 * one.systematic.max():.1f} µm, by the calibration alone; no mean over scans removes it"
         )
 
-    def _fill_lasers(self, lasers: list[int]) -> None:
-        wanted = [f"Laser {number}" for number in lasers]
+    def _name(self, laser: int) -> str:
+        from studio.calibration.words import laser_name
+
+        return laser_name(laser, () if self.work.solved is None else self.work.solved.names)
+
+    def _fill_lasers(self, wanted: list[str]) -> None:
         if wanted != [self.laser.itemText(i) for i in range(self.laser.count())]:
             self.laser.clear()
             self.laser.addItems(wanted)

@@ -62,14 +62,14 @@ def page(solved: Solved, target_um: float | None) -> str:
         parts.append("<p></p>")
     if result.depth:
         header = ["Depth error / µm", "rms", "worst", "line", *(["true"] if solved.true else [])]
-        rows = depth_rows(result, None if solved.true is None else list(solved.true))
+        rows = depth_rows(result, None if solved.true is None else list(solved.true), solved.names)
         parts.append(_table(header, rows))
     if result.advice is not None:
         name, _, told = next_sentence(result.advice, target_um).partition(": ")
         parts.append(f"<p style='color: {c.good if name == 'enough' else c.accent}'><b>{name}</b> {escape(told)}</p>")
     for name, sentence in check_rows(result, solved.views):
         parts.append(f"<p><b>{escape(name)}</b> {escape(sentence)}</p>")
-    parts += ["<p></p>", _table(["Parameter", "value", "sigma"], parameter_rows(result))]
+    parts += ["<p></p>", _table(["Parameter", "value", "sigma"], parameter_rows(result, solved.names))]
     return "".join(parts).replace(" um", " µm")
 
 

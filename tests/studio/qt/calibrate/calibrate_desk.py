@@ -22,6 +22,8 @@ from studio.qt.core.session import Session, one_of
 from tests.analysis.calibration.boards import SIZE, truth, views_of
 
 VIEWS = 8
+LINE = "blue line"
+"""Name of the laser."""
 
 
 CORNER = np.array([0.15, 0.1])
@@ -33,7 +35,7 @@ def seen() -> Material:
     """Corners and lines with noise, of boards that no photograph shows."""
     drawn = noisy(views_of(THERE, laser_step=64), np.random.default_rng(3))
     # from the first corner, as a board has them, not from its middle
-    return Material(tuple(replace(view, target=view.target + CORNER) for view in drawn), SIZE, 1)
+    return Material(tuple(replace(view, target=view.target + CORNER) for view in drawn), SIZE, 1, names=(LINE,))
 
 
 class Desk:

@@ -12,11 +12,12 @@ from pytestqt.qtbot import QtBot
 
 from studio.calibration import material
 from studio.calibration.exchange import read_camera
-from studio.qt.calibrate.board_view import COVERAGE, DEPTH, NEXT, RESIDUALS
+from studio.qt.calibrate.board_view import COVERAGE, DEPTH, NEXT, RESIDUALS, TABS
+from studio.qt.calibrate.calibrate_panel import NARROWEST
 from studio.qt.calibrate.keeping import FORMS, save, use, use_file
 from studio.qt.core import theme
 from tests.analysis.calibration.boards import SIZE
-from tests.studio.qt.calibrate.calibrate_desk import VIEWS, Desk, seen, settled
+from tests.studio.qt.calibrate.calibrate_desk import LINE, VIEWS, Desk, seen, settled
 from tests.studio.qt.shell.window_hands import contrast
 
 
@@ -136,6 +137,28 @@ class TestPictures:
         # the other views' noise, which 8 views let into the estimate, is in neither alike
         assert (before.depth[0].rms - now.depth[0].rms) / advice.gain == pytest.approx(1.0, abs=0.1)
 
+    def test_tabs_without_room_scroll_and_keep_their_words(self, solved: Desk) -> None:
+        tabs = solved.boards.tabs
+        tabs.resize(150, tabs.height())
+        for i, (title, _) in enumerate(TABS):
+            assert tabs.tabText(i) == title
+            assert tabs.tabRect(i).width() >= tabs.fontMetrics().horizontalAdvance(title)
+
+    def test_the_narrowest_panel_shows_between_which_boards_depth_is_told(self, qtbot: QtBot, solved: Desk) -> None:
+        panel = solved.panel
+        panel.resize(NARROWEST, 700)
+        panel.show()
+        qtbot.waitUntil(panel.isVisible)
+        for side in (panel.nearest, panel.farthest):
+            room = side.lineEdit().contentsRect().width()
+            assert room >= side.fontMetrics().horizontalAdvance(side.text())
+
+    def test_a_virtual_line_has_the_name_that_the_scene_gives_its_laser(self, solved: Desk) -> None:
+        told = solved.found.text.toPlainText()
+        assert f"{LINE}, 0." in told and f"{LINE}: normal" in told and "laser 0" not in told
+        solved.boards.tabs.setCurrentIndex(DEPTH)
+        assert solved.boards.caption.text().startswith("Blue line: depth errs")
+
     def test_what_is_not_asked_for_reads_as_a_sentence(self, solved: Desk) -> None:
         panel = solved.panel
         assert (panel.nearest.text(), panel.farthest.text()) == ("nearest board", "farthest board")
@@ -177,7 +200,7 @@ class TestPictures:
         text, result = solved.found.text.toPlainText(), solved.work.solved.result
         for _, sentence in check_rows(result, VIEWS):
             assert sentence.replace(" um", " µm") in text
-        for row in parameter_rows(result):
+        for row in parameter_rows(result, (LINE,)):
             assert all(part.replace(" um", " µm") in text for part in row)
 
 
