@@ -26,6 +26,8 @@ CORNERS = 5
 """Corners a side of the board that stand for all of them in a trial."""
 POINTS, MANY_POINTS = 24, 480
 """Laser points a line that stand for all of them, in a trial and in what is told of the best pose."""
+AHEAD = 20
+"""Views, one after the other, whose depth error is told."""
 LEAST_SEEN = 0.24
 """Share of the corners that a view must show to tell anything."""
 
@@ -40,6 +42,8 @@ class Advice:
     """(3,) m, the board's middle in the camera frame."""
     before: float
     after: float
+    ahead: tuple[float, ...] = ()
+    """m, after this view and one, two, ... more, each where it gains most of a few poses."""
 
     @property
     def tilt(self) -> float:
@@ -50,6 +54,10 @@ class Advice:
     def gain(self) -> float:
         """m by which the depth error falls."""
         return self.before - self.after
+
+    def views_until(self, wanted: float) -> int | None:
+        """Views to a depth error of no more, m; None: more than were looked ahead to."""
+        return next((1 + i for i, error in enumerate(self.ahead) if error <= wanted), None)
 
 
 def advise(
@@ -82,22 +90,31 @@ def advise(
     x, y = np.meshgrid(*(np.linspace(least[i], greatest[i], CORNERS) for i in (0, 1)))
     few = np.column_stack([x.ravel(), y.ravel()])
 
-    def left(poses: Estimate, corners: Float = few, points: int = POINTS) -> Float:
+    def told_by(poses: Estimate, corners: Float = few, points: int = POINTS) -> Float:
         weight_of_one = np.sqrt(len(target) / len(corners)) / sigmas[0]
-        told = _information(poses, corners, points, size, (weight_of_one, 1.0 / sigmas[1]))[:, used][:, :, used]
-        return np.asarray(np.einsum("kij,ji->k", np.linalg.inv((inner + told) * both), weight))
+        return _information(poses, corners, points, size, (weight_of_one, 1.0 / sigmas[1]))[:, used][:, :, used]
 
-    poses, rng = _candidates(estimate, middle, ends, most_tilt), np.random.default_rng(0)
-    after = left(poses)
+    def left(known: Float) -> Float:
+        return np.asarray(np.einsum("kij,ji->k", np.linalg.inv(known * both), weight))
+
+    everywhere, rng = _candidates(estimate, middle, ends, most_tilt), np.random.default_rng(0)
+    told = told_by(everywhere)
+    poses, after = everywhere, left(inner + told)
     for share in 0.5 ** np.arange(ROUNDS):
         near = _about(_one(poses, int(np.argmin(after))), middle, ends, most_tilt, float(share), rng)
-        found = left(near)
+        found = left(inner + told_by(near))
         if found.min() < after.min():
             poses, after = near, found
     best = _one(poses, int(np.argmin(after)))
     centre = best.rotation[0] @ np.append(target.mean(axis=0), 0.0) + best.translation[0]
-    reached = float(left(best, target, MANY_POINTS)[0])
-    return Advice(best.rotation[0], centre, float(np.sqrt(before)), float(np.sqrt(max(reached, 0.0))))
+    known = inner + told_by(best, target, MANY_POINTS)
+    ahead = [float(left(known)[0])]
+    for _ in range(AHEAD - 1):
+        next_one = _one(everywhere, int(np.argmin(left(known + told))))
+        known = known + told_by(next_one, target, MANY_POINTS)
+        ahead.append(float(left(known)[0]))
+    errors = tuple(float(np.sqrt(max(variance, 0.0))) for variance in ahead)
+    return Advice(best.rotation[0], centre, float(np.sqrt(before)), errors[0], errors)
 
 
 def _depth_weight(estimate: Estimate, volumes: list[Volume]) -> Float:

@@ -129,8 +129,14 @@ def next_sentence(advice: Advice, target_um: float | None) -> str:
         f"{abs(y):.0f} mm {'below' if y >= 0 else 'above'} of the camera's axis, tilted by "
         f"{np.degrees(advice.tilt):.0f} deg, {turned}: depth error {before:.1f} -> {after:.1f} um"
     )
-    little = advice.gain < SMALL_GAIN * advice.before
-    return told + ("; one more view gains little" if little and target_um is None else "")
+    if target_um is None:
+        return told + ("; one more view gains little" if advice.gain < SMALL_GAIN * advice.before else "")
+    views = advice.views_until(1e-6 * target_um)
+    if views is None:
+        return f"{told}; {target_um:g} um take more than {len(advice.ahead)} views more"
+    return f"{told}; " + (
+        f"{target_um:g} um are reached by it" if views == 1 else f"{target_um:g} um take about {views} views more"
+    )
 
 
 def recheck_sentence(part: Part) -> str:

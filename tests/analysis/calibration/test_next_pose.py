@@ -45,6 +45,22 @@ def test_a_view_that_is_taken_brings_the_depth_error_that_was_promised() -> None
     assert outcomes(0, 3) == pytest.approx(np.ones(3), abs=0.05)
 
 
+def test_views_that_are_taken_one_by_one_reach_what_was_looked_ahead_to() -> None:
+    """Ahead, fewer poses are tried than when each is proposed: it is a little more than comes."""
+    there = truth(1, 10)
+    views = noisy(views_of(there, laser_step=STEP), np.random.default_rng(1))
+    found = solved(views)
+    assert found.advice is not None
+    ahead = found.advice.ahead
+    assert np.all(np.diff(ahead) < 0.0) and found.advice.views_until(ahead[2]) == 3
+    for number in range(3):
+        advice = found.advice
+        assert advice is not None
+        views.append(taken(there, advice.rotation, advice.centre, 10 + number))
+        found = solved(views)
+    assert 0.8 < found.depth[0].rms / ahead[2] < 1.05
+
+
 @pytest.mark.validation
 def test_promise_over_outcome_is_one_in_the_median() -> None:
     found = [ratio for seed in range(12) for ratio in outcomes(seed, 2)]

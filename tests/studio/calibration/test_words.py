@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from analysis.calibration.lens_choice import LensTrial
+from analysis.calibration.next_pose import Advice
 from render.base.errors import InputError
 from studio.calibration.board_text import parse_board
 from studio.calibration.in_silico import virtual_views
-from studio.calibration.words import lens_sentence
+from studio.calibration.words import lens_sentence, next_sentence
 from studio.project.project import Project
 from studio.project.templates import template_folder
 
@@ -26,6 +28,19 @@ def test_the_lens_is_told_with_why_it_was_chosen_and_which_was_the_best() -> Non
 def test_a_lens_without_terms_may_be_the_best_itself() -> None:
     trials = [LensTrial(0, 0.959, 42e-6, 0.7), LensTrial(4, 0.964, 41e-6, 0.4), LensTrial(5, 0.975, 42e-6, 1.0)]
     assert "0: 0.959 and 42 um, chosen, the best, p = 0.7; 4: 0.964" in lens_sentence(0, trials)
+
+
+@pytest.mark.parametrize(
+    ("wanted_um", "ending"),
+    [
+        (27.0, "27 um are reached by it"),
+        (20.0, "20 um take about 3 views more"),
+        (5.0, "5 um take more than 4 views more"),
+    ],
+)
+def test_what_the_error_that_is_wanted_takes_is_told_with_the_next_pose(wanted_um: float, ending: str) -> None:
+    advice = Advice(np.eye(3), np.array([0.0, 0.0, 0.5]), 31e-6, 26e-6, (26e-6, 22e-6, 19e-6, 17e-6))
+    assert next_sentence(advice, wanted_um).endswith(f"26.0 um; {ending}")
 
 
 def test_without_a_laser_no_depth_is_told() -> None:
