@@ -144,6 +144,7 @@ class CalibratePanel(QWidget):
         self.use.setEnabled(work.solved is not None)
         if not self.board.hasFocus():
             self.board.setText(work.board_text)
+            self.board.setCursorPosition(0)
         self.lens.setEnabled(work.what not in OF_A_FILE)  # the known camera has its own
         table, holds = work.motion_file, None if work.motion_file is None else work.holds
         for i, (text, which) in enumerate(CARRIED):

@@ -95,4 +95,5 @@ class RemedyList(QWidget):
 
 def sentence(remedy: Remedy) -> str:
     """What is done, and what it gains."""
-    return f"{remedy.label[:1].upper()}{remedy.label[1:]}: {remedy.gain}"
+    label = remedy.label if remedy.label.startswith("f/") else remedy.label[:1].upper() + remedy.label[1:]
+    return f"{label}: {remedy.gain}"
