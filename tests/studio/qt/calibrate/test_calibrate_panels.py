@@ -155,7 +155,8 @@ class TestPictures:
 
     def test_a_virtual_line_has_the_name_that_the_scene_gives_its_laser(self, solved: Desk) -> None:
         told = solved.found.text.toPlainText()
-        assert f"{LINE}, 0." in told and f"{LINE}: normal" in told and "laser 0" not in told
+        assert f"{LINE}, 0." in told and f"{LINE}: normal" in told
+        assert "laser 0," not in told and "laser 0:" not in told
         solved.boards.tabs.setCurrentIndex(DEPTH)
         assert solved.boards.caption.text().startswith("Blue line: depth errs")
 

@@ -173,12 +173,13 @@ def test_the_list_tells_of_ambient_light_however_few_its_samples_are(qtbot: QtBo
     """With a goal most of its pixels are interpolated, which is said where the words have room."""
     world, frame = small_render()
     few = tuple(replace(one, work=0.2) if one.group == "ambient" else one for one in frame.quality)
-    render = Render(1, small_project(), world, replace(frame, quality=few))
+    project = small_project().replaced({"render.goal": {"depth": 0.1}})
+    render = Render(1, project, world, replace(frame, quality=few))
     assert frame.quality_of("ambient") is not None
     asked = render.project.render.ambient_samples
     told = f"ambient 0.2 samples a pixel reached on average, {asked} asked, as most are interpolated"
     assert told in describe(render) and "% reached by the depth's goal" in describe(render)
-    without = replace(render, project=small_project().replaced({"render.goal": None}))
+    without = replace(render, project=small_project())
     assert f"% reached, {without.project.render.laser_error:.2%} asked" in describe(without)
     short = in_short(render)[1]
     assert short.startswith("reached: laser ") and short.endswith("ambient 0.2/px"), "and not what was asked for"
