@@ -64,9 +64,10 @@ class PartSteps:
         if scan.measured_as.measured_in != self._session.project.measured_in:
             return f"{told} All steps were measured in another section: {AGAIN}."
         if gauge is None:
-            if any(self.shown(one) for one in gauges):
-                return f"Of all {scan.count} steps, {LAST}: values are those of the worst step."
-            return f"{told[:-1]}; flatness of all steps." if any(one.of_scan for one in gauges) else told
+            together = "; flatness of all steps together" if any(one.of_scan for one in gauges) else ""
+            if any(self.shown(one) for one in gauges if not one.of_scan):
+                return f"Of all {scan.count} steps, {LAST}: values are those of the worst step{together}."
+            return f"{told[:-1]}{together}."
         entry = self.entry(gauge)
         if entry is None:
             return f"{told} All steps are not measured like this yet: {AGAIN}." if scan.measured else told

@@ -132,7 +132,7 @@ def test_a_scan_is_measured_again_with_the_measures_of_now(
     assert not measured_otherwise(bench.session, bench.session.shown)
     panel = ResultsPanel(bench.session)
     qtbot.addWidget(panel)
-    qtbot.waitUntil(lambda: panel.part.told.text().startswith("Of step 1 of 3; flatness of all steps."))
+    qtbot.waitUntil(lambda: panel.part.told.text().startswith("Of step 1 of 3; flatness of all steps together."))
     panel.close()
     # opened again, where the project's file is another by now, it has what it was measured with
     file.unlink()
