@@ -258,6 +258,7 @@ class CalibratePanel(QWidget):
         sources.addStretch(1)
         form = QFormLayout()
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        form.setVerticalSpacing(3)  # a low screen holds seven rows and the table
         form.addRow("Board", self.board)
         form.addRow("Find", self.what)
         form.addRow("Lens", self.lens)
