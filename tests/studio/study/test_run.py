@@ -241,12 +241,16 @@ def test_a_disk_without_room_for_the_study_is_told_before_anything_runs(
     assert not out.exists()
 
 
+def command(*words: object) -> list[str]:
+    """A study in a program of its own, which can be killed."""
+    return [sys.executable, str(ROOT / "main.py"), "study", *map(str, words)]
+
+
 @pytest.mark.validation
 def test_a_killed_study_goes_on_with_nothing_lost_or_done_twice(whole: tuple[Path, bytes], tmp_path: Path) -> None:
     file, out = tmp_path / "study.json", tmp_path / "out"
     file.write_text(json.dumps(DATA))
-    words = ("study", "run", str(file), "--out", str(out), "--workers", "2", "--json")
-    run_it = [sys.executable, str(ROOT / "main.py"), *words]
+    run_it = command("run", file, "--out", out, "--workers", "2", "--json")
     process = subprocess.Popen(run_it, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     chosen = study()
     deadline = time.monotonic() + 300.0

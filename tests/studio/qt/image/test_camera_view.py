@@ -228,8 +228,8 @@ def test_boxes_have_their_names_as_far_as_there_is_room(qtbot, made):
         ((1400, 700), (True, True), False),
     ):
         made.resize(*size)
+        qtbot.waitUntil(lambda: (made.overlay.truth_box.text() != "", made.saturated.text() != "") == names)  # noqa: B023
         qtbot.wait(20)
-        assert (made.overlay.truth_box.text() != "", made.saturated.text() != "") == names
         assert (made.lines.y() > made.choice.y() + 10) == below
         assert made.lines.width() >= made.overlay.width_within(made.lines.width())
 
