@@ -46,8 +46,9 @@ from studio.scan.stages import Measurement
 OF_A_CELL = "This is a cell of a study, as it was measured; the settings above are for the project's own renders."
 REST_MS = 120
 """Without a change before the lines are measured: while something is dragged, new images come first."""
-RESTED = 3.0
-"""Times what developing and measuring took, until a render that goes on is looked at again: it has the processor."""
+RESTED, WITHOUT_FIGURES = 3.0, 9.0
+"""Times what developing and measuring took, until a render that goes on is looked at again: it has the processor. The
+latter while its light shows no figures yet."""
 
 
 class DevelopPanel(QWidget):
@@ -307,10 +308,10 @@ class DevelopPanel(QWidget):
         def then(images: list[Image]) -> None:
             self._without_figures = render.refining and frame.awaits_ambient
             if self._without_figures:
-                self._rest_from(self._began)
+                self._rest_from(self._began, WITHOUT_FIGURES)
                 return  # figures without its noise would be too good, and take time from it
             self._to_measure = (render, frame, how, images, methods)
-            self._rest.start()
+            self._rest.start(0 if render.refining else REST_MS)  # nobody drags light
 
         self._rest.stop()
         self.runner.cancel("measure")
@@ -355,10 +356,10 @@ class DevelopPanel(QWidget):
 
         self.runner.run("measure", "measuring", work, then, interrupt=True)
 
-    def _rest_from(self, began: float) -> None:
+    def _rest_from(self, began: float, times: float = RESTED) -> None:
         """What was begun then is done."""
         now = time.perf_counter()
-        self._free_at = now + RESTED * (now - began)
+        self._free_at = now + times * (now - began)
 
     def _tell_measures(self, found: dict[str, list[Measurement]]) -> None:
         small = f" at {self._told_of.scanner_scale:.3g} x" if self._told_of and self._told_of.scanner_scale != 1 else ""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 SAMPLE = "weld_seam"
 BAD_INPUT = 2
-FIRST_LOOK_MS = 500
+FIRST_LOOK_MS = 100
 FIRST_SELECTION = ("scene", "rig", "lasers", 0)
 """So that the first screen shows handles to drag and a form to type into."""
 
