@@ -136,9 +136,8 @@ def _decided_by(verdict: str, surface: str, gauges: list[str], names: list[str])
     """What it is that is out, or is not decided; empty: nothing is."""
     if verdict not in DECIDED_BY:
         return ""
-    of = [*(["the surface"] if surface == verdict else [])]
-    of += [name for name, one in zip(names, gauges, strict=True) if one == verdict]
-    return f"{DECIDED_BY[verdict]}: {', '.join(of)}."
+    judged = zip(("the surface", *names), (surface, *gauges), strict=True)
+    return f"{DECIDED_BY[verdict]}: {', '.join(name for name, one in judged if one == verdict)}."
 
 
 def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:

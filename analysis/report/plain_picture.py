@@ -82,14 +82,12 @@ def _add_mesh(axes: Any, vertices: Float, triangles: NDArray[np.int32], colour: 
 
 
 def _simplified(vertices: Float, triangles: NDArray[np.int32]) -> tuple[Float, NDArray[np.int32]]:
-    """One vertex for all that lie in the same cell of a grid, and the triangles that are left."""
-    cell = float(np.max(np.ptp(vertices, axis=0))) / CELLS
-    where = np.floor((vertices - vertices.min(axis=0)) / cell).astype(np.int64) @ [1, 1 << 20, 1 << 40]
-    _, of, count = np.unique(where, return_inverse=True, return_counts=True)
-    means = np.stack([np.bincount(of, axis) / count for axis in vertices.T], axis=1)
-    left = np.unique(of[triangles], axis=0)
-    apart = (left[:, 0] != left[:, 1]) & (left[:, 1] != left[:, 2]) & (left[:, 2] != left[:, 0])
-    return means, left[apart].astype(np.int32)
+    """Vertices gathered in cells of a grid."""
+    import open3d as o3d
+
+    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(triangles))
+    simple = mesh.simplify_vertex_clustering(float(np.max(np.ptp(vertices, axis=0))) / CELLS)
+    return np.asarray(simple.vertices), np.asarray(simple.triangles)
 
 
 def _add_path(axes: Any, points: Float, colour: Any, width: float) -> None:

@@ -74,7 +74,6 @@ class DevelopPanel(QWidget):
         self._later.timeout.connect(self.refresh)
         self._rest = QTimer(self)
         self._rest.setSingleShot(True)
-        self._rest.setInterval(REST_MS)
         self._rest.timeout.connect(self._measure)
         self.exposure = LogField(1e-6, 1.0, 1e3, "ms", 4)
         self.exposure.setToolTip("Exposure time: longer is brighter, until the line saturates.")

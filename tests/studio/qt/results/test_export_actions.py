@@ -92,15 +92,22 @@ def test_the_height_map_of_a_scan_is_of_all_its_points(
     assert json.loads((tmp_path / "map.json").read_text())["points"] == 20
 
 
-def test_an_export_that_takes_longer_beside_other_work_is_told_at_once(
-    measured: tuple[Session, DevelopPanel], qtbot: QtBot, tmp_path: Path
-) -> None:
+def exporting(
+    measured: tuple[Session, DevelopPanel], qtbot: QtBot, folder: Path
+) -> tuple[Session, JobRunner, ExportActions]:
+    """What a window exports by, without the panel that measures."""
     session, panel = measured
     panel.close()
     window = QMainWindow()
     qtbot.addWidget(window)
     runner = JobRunner(window)
-    actions = ExportActions(window, session, runner, PreferencesFile(tmp_path / "p.json"), Actions(window))
+    return session, runner, ExportActions(window, session, runner, PreferencesFile(folder / "p.json"), Actions(window))
+
+
+def test_an_export_that_takes_longer_beside_other_work_is_told_at_once(
+    measured: tuple[Session, DevelopPanel], qtbot: QtBot, tmp_path: Path
+) -> None:
+    session, runner, actions = exporting(measured, qtbot, tmp_path)
     told: list[str] = []
     session.message.connect(lambda kind, text: told.append(text))
     go_on = threading.Event()
@@ -126,12 +133,7 @@ def test_the_name_of_a_file_is_told_once_while_it_is_written(
     measured: tuple[Session, DevelopPanel], qtbot: QtBot, tmp_path: Path
 ) -> None:
     """ "export a.csv: a.csv", said the status bar."""
-    session, panel = measured
-    panel.close()
-    window = QMainWindow()
-    qtbot.addWidget(window)
-    runner = JobRunner(window)
-    actions = ExportActions(window, session, runner, PreferencesFile(tmp_path / "p.json"), Actions(window))
+    _, runner, actions = exporting(measured, qtbot, tmp_path)
     with qtbot.waitSignal(runner.finished) as ended:
         actions.write("export_csv", tmp_path / "a.csv")
     assert f"{ended.args[0].name}: {ended.args[0].stage}".count("a.csv") == 1
