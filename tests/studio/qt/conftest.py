@@ -74,6 +74,14 @@ def kernels() -> None:
     warm_up(STEPS, lambda stage, done: None, lambda: False)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def styled(qapp: QApplication) -> None:
+    """In the style that users see, from the first test on: widths of widgets are its."""
+    from studio.qt.core import theme
+
+    theme.apply("light")
+
+
 @pytest.fixture(autouse=True)
 def no_thread_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
     """A job that outlives its window would crash later, in a test that has nothing to do with it."""

@@ -222,7 +222,7 @@ def test_boxes_have_their_names_as_far_as_there_is_room(qtbot, made):
         ((700, 700), (True, True), True),
         ((700, 220), (False, True), False),
         ((600, 300), (True, True), True),
-        ((570, 220), (False, False), False),
+        ((605, 220), (False, False), False),
         ((500, 300), (False, True), True),
         ((400, 700), (False, True), True),
         ((1400, 700), (True, True), False),
