@@ -1,0 +1,129 @@
+"""Ten thousand labelled images of every ready-made recipe, made as a user makes them: rate, memory, efficiency.
+
+    python tests/benchmarks/bench_dataset_long.py [images] [recipe ...]      default: 10000 of all together
+
+Each recipe makes its share of the images at 1.25 Mpx by a process per processor, two on the machine of the bars, into a
+folder that is removed after. By the clock, starts of the processes and the index of each folder included. Memory is
+that of all processes together. Efficiency: what one process takes for a scene, over what each of all takes, of the
+same first scenes, their starts left out.
+
+Bars: 2.5 images a second by two processes over all recipes; memory after a tenth of the images within 2 % of what it
+was until then; efficiency 0.85.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from studio.dataset.images import images_of
+from studio.dataset.recipe import Recipe, base_of, ready_made
+from studio.dataset.run import Wanted, make_dataset
+from studio.runtime.workers import Engine
+from tests.benchmarks.bench_dataset import MEGAPIXELS, MEMORY_BAR, parts
+
+BAR, EFFICIENCY_BAR = 2.5, 0.85
+WATCHED = 0.5
+"""s between two looks at the memory."""
+FIRST, COMPARED = 4, 16
+"""Scenes that efficiency leaves out, as processes start, and those that it is about."""
+
+
+def main() -> int:
+    words = sys.argv[1:]
+    wanted = int(words.pop(0)) if words and words[0].isdigit() else 10_000
+    names, processes = words or ready_made(), os.cpu_count() or 1
+    images, seconds, fine, alone, shared = 0, 0.0, True, 0.0, 0.0
+    print(f"images a second by {processes} processes, memory of all; processor s an image of render and photograph")
+    for name in names:
+        recipe, root, each = scaled(name)
+        scenes = math.ceil(wanted / len(names) / each)
+        made, took, held = run(recipe, root, scenes, processes)
+        tenth = max(held[: len(held) // 10 + 1])
+        fine = fine and max(held) <= (1.0 + MEMORY_BAR) * tenth
+        images, seconds = images + made, seconds + took
+        one, all_of_them = (pace(recipe, root, count) for count in (1, processes))
+        alone, shared = alone + one, shared + processes * all_of_them
+        light, shot = parts(recipe, root, 3)
+        print(
+            f"{name:14} {made:5d} images, {made / took:5.2f} a second; {tenth:.0f} to {max(held):.0f} MB; "
+            f"render {light:.3f}, photograph {shot:.3f}; efficiency {one / (processes * all_of_them):.2f}",
+            flush=True,
+        )
+    rate, efficiency = images / seconds, alone / shared
+    print(
+        f"{images} images in {seconds:.0f} s: {rate:.2f} a second (bar {BAR}); memory {'flat' if fine else 'NOT flat'}"
+    )
+    print(f"efficiency of {processes} processes {efficiency:.2f} (bar {EFFICIENCY_BAR})")
+    return 0 if fine and rate >= BAR and efficiency >= EFFICIENCY_BAR else 1
+
+
+def scaled(name: str) -> tuple[Recipe, Path, int]:
+    """A recipe with images of 1.25 Mpx, where its files lie, and its images a scene."""
+    recipe, root = Recipe.load(name)
+    base = base_of(recipe, root)
+    pixels = base.scene.camera.width * base.scene.camera.height
+    recipe = recipe.model_copy(update={"image_scale": math.sqrt(MEGAPIXELS * 1e6 / pixels)})
+    return recipe, root, images_of(recipe, len(base.scene.lasers))
+
+
+def run(recipe: Recipe, root: Path, scenes: int, processes: int) -> tuple[int, float, list[float]]:
+    """Images, s by the clock, and MB held while scenes were done: one look for each scene, the most since the last."""
+    most, over, held = [0.0], threading.Event(), list[float]()
+
+    def watch() -> None:
+        while not over.wait(WATCHED):
+            most[0] = max(most[0], memory_of(os.getpid()))
+
+    def progress(done: int, known: int) -> None:
+        if done:
+            held.append(max(most[0], memory_of(os.getpid())))
+            most[0] = 0.0
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    try:
+        with tempfile.TemporaryDirectory() as out:
+            began = time.perf_counter()
+            made = make_dataset(recipe, root, Wanted(scenes), Path(out), engine=Engine(processes), progress=progress)
+            return made.images, time.perf_counter() - began, held
+    finally:
+        over.set()
+        watcher.join()
+
+
+def pace(recipe: Recipe, root: Path, processes: int) -> float:
+    """s a scene by the clock, of the same first scenes."""
+    times: list[float] = []
+
+    def progress(done: int, known: int) -> None:
+        times.append(time.perf_counter())
+
+    with tempfile.TemporaryDirectory() as out:
+        wanted = Wanted(FIRST + COMPARED)
+        make_dataset(recipe, root, wanted, Path(out), engine=Engine(processes), progress=progress)
+    return (times[-1] - times[FIRST]) / COMPARED
+
+
+def memory_of(process: int) -> float:
+    """MB that a process and those that it started hold."""
+    folder = Path("/proc") / str(process)
+    try:
+        own = int((folder / "statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+        children = {
+            int(child) for task in (folder / "task").iterdir() for child in (task / "children").read_text().split()
+        }
+    except OSError:
+        return 0.0  # it has just ended
+    return own + sum(map(memory_of, children))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
