@@ -104,8 +104,9 @@ def compare(
     step = np.linalg.norm(points.gradient, axis=1)
     normals = normals @ T_world_camera[:3, :3]
     common = systematic_along(points, normals, per_pixel * sheet_bias)
-    wrong = outliers(position, 1.0, MATCH_SIGMAS * line.width[points.index, points.rank])
     where = points.index, points.rank
+    edge, depth_of_pixel = MATCH_SIGMAS * line.width[where], np.abs(points.gradient[:, 2])
+    wrong = outliers(position, 1.0, edge)
     valid_rows = np.unique(points.index[points.valid])
     truth_rows = np.unique(curve.index[lit])
     return Errors(
@@ -118,9 +119,9 @@ def compare(
         sheet_bias=sheet_bias,
         normal=normals,
         outlier=wrong,
-        u=measure(position, points.sigma_pixel, 1.0, *where),
-        depth_z=measure(depth, points.sigma_depth, np.abs(points.gradient[:, 2]), *where),
-        surface=measure(off_surface, per_pixel * points.sigma_pixel, step, *where),
+        u=measure(position, points.sigma_pixel, 1.0, *where, edge),
+        depth_z=measure(depth, points.sigma_depth, depth_of_pixel, *where, edge * depth_of_pixel),
+        surface=measure(off_surface, per_pixel * points.sigma_pixel, step, *where, edge * step),
         truth_rows=len(truth_rows),
         valid_rows=len(valid_rows),
         measured_rows=len(np.unique(points.index[matched & ~wrong])),

@@ -39,7 +39,7 @@ class Measures:
     p95: float
     """95 % of the errors are smaller in size."""
     outlier_rate: float
-    """Errors larger than `floor` and than 5 robust sigma."""
+    """Errors larger than `floor`, and than 5 robust sigma or `ceiling`."""
     autocorrelation: float
     """Between neighbouring scan lines, outliers left out and others counted to 3 robust sigma at most: near 0 for
     independent rows, towards 1 after smoothing."""
@@ -69,18 +69,23 @@ def robust_sigma(error: Float) -> float:
 
 
 def measure(
-    error: Float, sigma: Float, floor: Float | float, index: NDArray[np.intp], rank: NDArray[np.intp]
+    error: Float,
+    sigma: Float,
+    floor: Float | float,
+    index: NDArray[np.intp],
+    rank: NDArray[np.intp],
+    ceiling: Float | float = np.inf,
 ) -> Measures:
     """Measures of (m,) errors, NaN left out.
 
-    sigma (m,) predicted standard deviation, NaN where there is none; floor: the error of one pixel, a number or (m,);
-    index, rank (m,) scan line and peak of each error, for the autocorrelation.
+    sigma (m,) predicted standard deviation, NaN where there is none; floor, ceiling: those of `outliers`, numbers or
+    (m,); index, rank (m,) scan line and peak of each error, for the autocorrelation.
     """
     here = np.isfinite(error)
     if not np.any(here):
         return EMPTY
     e = error[here]
-    out = outliers(error, floor)[here]
+    out = outliers(error, floor, ceiling)[here]
     predicted = sigma[here]
     has_sigma = np.isfinite(predicted)
     covered = np.abs(e[has_sigma]) <= 2.0 * predicted[has_sigma]

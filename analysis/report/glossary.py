@@ -16,13 +16,15 @@ GLOSSARY = (
     ("RMSE", "The root of the mean squared error: bias and scatter together."),
     ("Robust sigma", "The scatter as it would be without outliers: 1.4826 times the median distance from the median."),
     ("P95", "95 % of the errors are smaller in size than this."),
-    ("Outliers", "Errors beyond five robust sigma that are also larger than one pixel makes: wrong peaks, edges."),
+    ("Outliers", "Errors larger than one pixel makes, and than five robust sigma or half the line's width: wrong "
+     "peaks, edges."),
     ("Lag 1", "Correlation between the errors of neighbouring scan lines. Near 0: each row errs by itself, like noise. "
      "Towards 1: they err together, through smoothing, texture or shape."),
     ("Predicted sigma", "What the extraction claims about its own error from the noise of the pixels, carried through "
      "the triangulation. Of honest claims 95.4 % of the errors lie within ±2 sigma."),
     ("Correlation length", "How many neighbouring scan lines err alike, by speckle, smoothing or a filter of two "
      "dimensions: the variance of a mean over n lines is that many times the one of independent lines."),
-    ("Complete", "Share of the scan lines with a visible line on which it was found, and not as an outlier."),
+    ("Complete", "Share of the scan lines with a visible line on which it was found, and not as an outlier: rightly "
+     "measured."),
     ("px, DN, e⁻", "Pixel; digital number, the value in the image; electrons collected by a pixel."),
 )  # fmt: skip

@@ -17,6 +17,8 @@ TOLD_OF_NOISE = 0.3
 """Of the robust sigma, from which on the calibration's error is told."""
 DOMINATED = 3.0
 """RMSE over robust sigma from which a few outliers are told: without any it is near 1, on textured parts near 2."""
+WRONG = "wrong by more than a pixel, and five times the usual error or half the line's width"
+"""Of outliers."""
 LITTLE = 0.5
 """Completeness below which the errors describe chance finds rather than the line."""
 
@@ -110,17 +112,16 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
     dominated = found.depth_z.rmse > DOMINATED * usual
     if found.u.outlier_rate > 0.002:
         said.append(
-            f"{percent(found.u.outlier_rate)} of the points are outliers, wrong by more than a pixel and five times "
-            f"the usual error: a wrong peak, or an edge. {'They dominate the RMSE; t' if dominated else 'T'}he robust "
-            "sigma leaves them out."
+            f"{percent(found.u.outlier_rate)} of the points are outliers, {WRONG}: a wrong peak, or an edge. "
+            f"{'They dominate the RMSE; t' if dominated else 'T'}he robust sigma leaves them out."
         )
     elif found.outliers and dominated:
         few = "1 point is an outlier" if found.outliers == 1 else f"{count(found.outliers)} points are outliers"
         them = "it" if found.outliers == 1 else "them"
         said.append(
-            f"{few}, wrong by more than a pixel and five times the usual error. Of {count(found.points)} points that "
-            f"is few, but the RMSE of {micrometres(found.depth_z.rmse)} is mostly of {them}; the robust sigma, which "
-            f"leaves {them} out, is {micrometres(found.depth_z.robust_sigma)}."
+            f"{few}, {WRONG}. Of {count(found.points)} points that is few, but the RMSE of "
+            f"{micrometres(found.depth_z.rmse)} is mostly of {them}; the robust sigma, which leaves {them} out, is "
+            f"{micrometres(found.depth_z.robust_sigma)}."
         )
     if found.calibration > TOLD_OF_NOISE * found.depth_z.robust_sigma:
         said.append(

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.error import MATCH_SIGMAS
 from analysis.line.result import Flag
 from analysis.measures import Measures, measure
 from analysis.report.sample import Rows
@@ -116,17 +117,23 @@ def _sheet_bias(values: Float) -> tuple[float, float]:
 
 def position_measures(rows: Rows) -> Measures:
     """Measures of the error along the scan line, px."""
-    return measure(rows["position"], rows["sigma_position"], 1.0, rows["index"], rows["rank"])
+    return _measures(rows, "position", 1.0)
 
 
 def depth_measures(rows: Rows) -> Measures:
     """Measures of the error of depth_z, m."""
-    return measure(rows["depth"], rows["sigma_depth"], rows["pixel_depth"], rows["index"], rows["rank"])
+    return _measures(rows, "depth", rows["pixel_depth"])
 
 
 def surface_measures(rows: Rows) -> Measures:
     """Measures of the error normal to the surface, m."""
-    return measure(rows["off_surface"], rows["sigma_off_surface"], rows["pixel_distance"], rows["index"], rows["rank"])
+    return _measures(rows, "off_surface", rows["pixel_distance"])
+
+
+def _measures(rows: Rows, name: str, pixel: Float | float) -> Measures:
+    """pixel: the error that one pixel makes."""
+    edge = MATCH_SIGMAS * rows["width"] * pixel
+    return measure(rows[name], rows[f"sigma_{name}"], pixel, rows["index"], rows["rank"], edge)
 
 
 def _exact(found: Measures, moments: Moments) -> Measures:

@@ -153,6 +153,9 @@ def test_stray_peaks_do_not_count_as_measured_however_many_they_are():
     assert errors.valid_rows > 1400
     # each stray peak is within 2 px of the line by a chance of 4 in 2448
     assert 200 <= errors.measured_rows <= 200 + 12
+    left_out = 1.0 - errors.measured_rows / errors.u.count
+    assert errors.u.outlier_rate == pytest.approx(left_out), "what completeness leaves out is told as outliers"
+    assert errors.depth_z.outlier_rate == pytest.approx(left_out, abs=2 / 1800)
 
 
 def test_a_laser_without_light_draws_no_line_to_be_found():

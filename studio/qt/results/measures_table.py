@@ -17,7 +17,7 @@ HONEST = 88.0
 """Percent within 2 sigma below which more than noise moves the line; the report remarks on it from there as well."""
 EXPLAINED = {
     "Points": "Points measured.",
-    "Completeness": "Share of the scan lines on which the line can be seen that have a right measurement.",
+    "Completeness": "Share of the scan lines on which the line can be seen that have a point of it, and no outlier.",
     "False scan lines": "Scan lines with a point although no line is to be seen there.",
     "Bias": "Mean error: what averaging does not remove.",
     UNCERTAINTY: "Twice the standard deviation of the bias, as neighbouring scan lines err alike: a smaller one may be "
@@ -26,7 +26,7 @@ EXPLAINED = {
     "RMSE": "Bias and sigma together: the root of the mean squared error.",
     "Robust sigma": "The spread as it would be without outliers.",
     "95 % within": "95 % of the errors are smaller than this.",
-    "Outliers": "Errors larger than a pixel and than five times the usual error.",
+    "Outliers": "Errors larger than a pixel, and than five times the usual error or half the line's width.",
     COVERED: "Share of the errors within twice the predicted sigma, of the image's noise and, where points are made "
     "with a calibration, of that: 95 % where nothing else moves the line. Less: texture or edges under it, or too few "
     "pixels. A calibration's error is common to all points, so that all of them may be within or without.",
