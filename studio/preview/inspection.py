@@ -29,6 +29,7 @@ from render.world.material_checks import check_materials, scene_warnings
 from render.world.placement_checks import check_placement
 from render.world.world import build_world
 from studio.preview.estimates import line_width_px
+from studio.preview.scintillation import exceeding
 from studio.project.project import Project
 
 PROBE_ERROR = 0.05
@@ -152,7 +153,8 @@ def _laser_view(project: Project, frame: Frame, i: int, power: float, ambient: F
     nearest, farthest = working_range(camera, scene.T_camera_laser(i))
     hit = np.unique(curve.index)
     light, width = _brightness(project, frame, i, power, hit)
-    peak = light + project.sensor.dark_current * project.sensor.exposure_time
+    dark, wavelength = project.sensor.dark_current * project.sensor.exposure_time, scene.lasers[i].wavelength_nm
+    peak = light + dark
     length, length_px = _lengths(curve)
     some = len(curve.point) > 0
     depth_px, along_px = _resolution(camera, plane, curve) if some else (None, None)
@@ -174,7 +176,7 @@ def _laser_view(project: Project, frame: Frame, i: int, power: float, ambient: F
         light_electrons=float(np.median(light)) if some else None,
         peak_electrons=float(np.median(peak)) if some else None,
         peak_electrons_most=float(peak.max()) if some else None,
-        saturated=float(np.mean(peak > project.sensor.full_well)) if some else None,
+        saturated=float(np.mean(exceeding(project.sensor, camera, wavelength, light, dark))) if some else None,
         ambient_saturated=_saturated_along(curve, ambient, project.sensor.full_well),
         steepest_view=float(max(curve.camera_angle.max(), curve.laser_angle.max())) if some else None,
     )

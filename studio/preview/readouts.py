@@ -15,8 +15,10 @@ from render.camera.camera import Camera
 from studio.preview import estimates
 from studio.preview.inspection import working_range
 from studio.preview.preview import Look
-from studio.preview.scintillation import speckle_px
+from studio.preview.scintillation import brightest, saturated_share, speckle_px
 
+RARE = 0.005
+"""Share of the scan lines that an exposure may leave saturated by speckle."""
 SPECKLED = 64
 """Places along the line at which the effect of speckle is worked out."""
 
@@ -68,7 +70,9 @@ class Readouts:
     peak_electrons: Range | None = None
     """Of the brightest pixel of a scan line, before saturation."""
     saturated: float | None = None
-    """Share of the scan lines that are hit."""
+    """Share of the scan lines that are hit, with the sensor's speckle."""
+    brightest: float = 1.0
+    """Times its mean that speckle makes a pixel's laser light on RARE of the scan lines; 1 without speckle."""
     ambient_electrons: float | None = None
     """Background of ambient light and dark current, unshadowed, median."""
     blur_px: Range | None = None
@@ -134,6 +138,9 @@ def readouts(look: Look, laser: int) -> Readouts:
     some = np.unique(np.linspace(0, len(width) - 1, SPECKLED).astype(int))
     shown = width[some], curve.position[some], amplitude[some], ambient[some]
     speckle = speckle_px(camera, source.wavelength_nm, *shown, read, sensor.speckle == "depolarised")
+    saturated = len(np.unique(curve.index[peak > sensor.full_well])) / len(hit)
+    if sensor.speckle != "off":
+        saturated = float(np.mean(saturated_share(sensor, camera, source.wavelength_nm, *shown)))
     return replace(
         known,
         triangulation_angle=_range(triangulation_angles(curve.point, T_camera_laser[:3, 3])),
@@ -142,7 +149,8 @@ def readouts(look: Look, laser: int) -> Readouts:
         along_per_px=_range(np.linalg.norm(estimates.resolution(camera, plane, pixels, along), axis=1)),
         width_px=_range(width),
         peak_electrons=_range(peak),
-        saturated=len(np.unique(curve.index[peak > sensor.full_well])) / len(hit),
+        saturated=saturated,
+        brightest=brightest(sensor, camera, source.wavelength_nm, RARE),
         ambient_electrons=float(np.median(ambient)),
         blur_px=_range(estimates.blur_px(camera, curve.point)),
         photon_sigma=_median(bound * depth),

@@ -81,14 +81,15 @@ def _differ(before: float | None, after: float | None) -> bool:
 
 
 def automatic_exposure(project: Project, now: Readouts) -> Change | None:
-    """An exposure that fills FILLED of the full well where the line is brightest; None: there is no line to go by.
+    """An exposure that fills FILLED of the full well where line and speckle are brightest; None: there is no line.
 
     InputError: it would be beyond what an exposure may be.
     """
     if now.peak_electrons is None or not now.peak_electrons.high > 0.0:
         return None
     before = project.sensor.exposure_time
-    time = float(f"{before * FILLED * now.full_well / now.peak_electrons.high:.3g}")
+    most = now.brightest * now.peak_electrons.high
+    time = float(f"{before * FILLED * now.full_well / most:.3g}")
     return _told("exposure", "s", before, time), replaced(project, EXPOSURE, time)
 
 

@@ -44,6 +44,16 @@ def test_the_exposure_is_set_to_fill_a_share_of_the_full_well(time: float, key: 
     assert peak.high == pytest.approx(FILLED * remedy.project.sensor.full_well, rel=5e-3)
 
 
+def test_an_exposure_leaves_room_for_speckle() -> None:
+    project, (remedy,) = found_for({("sensor", "exposure_time"): 0.5, ("sensor", "speckle"): "polarised"})
+    smooth = found_for({("sensor", "exposure_time"): 0.5})[1][0].project.sensor.exposure_time
+    assert remedy.project.sensor.exposure_time < 0.7 * smooth
+    kept = read(replaced(project, ("sensor", "exposure_time"), smooth)).saturated
+    found = read(remedy.project).saturated
+    assert kept is not None and found is not None
+    assert found < 0.005 < 0.02 < kept, "what is right without speckle is too long with it"
+
+
 @pytest.mark.parametrize(("angle", "width"), [(2e-2, 3.0), (1e-4, 1.0)])
 def test_a_sheet_is_brought_to_a_width_that_measures_well(angle: float, width: float) -> None:
     _, found = found_for({(*LASER, "sheet", "full_angle"): angle})
