@@ -166,6 +166,7 @@ class PartTab(QWidget):
         if not self.session.set(("measures",), (*now, gauge), f"add {TITLES[kind].lower()}"):
             self.chosen = len(now) - 1
             self.refresh()
+        self.table.setFocus()  # Del is about the measure, not about a part of the scene
 
     def delete(self) -> None:
         now = self.session.project.measures
@@ -221,6 +222,7 @@ class PartTab(QWidget):
     def _moved(self, regions: object) -> None:
         if self._with_regions(regions):
             self.session.set(("measures", self.chosen, "regions"), regions, "move a region")
+            self.table.setFocus()
         else:
             self.refresh()
 

@@ -26,15 +26,16 @@ MOTIONS = (NoMotion, LinearStage, Turntable, PoseList)
 Edit = Callable[[Project], scene_edits.Result]
 
 
-def apply(session: Session, label: str, edit: Edit) -> None:
-    """Make an edit current and select what it made; a refusal is told and changes nothing."""
+def apply(session: Session, label: str, edit: Edit) -> bool:
+    """Make an edit current and select what it made; a refusal is told, changes nothing and is False."""
     try:
         project, path = edit(session.project)
     except InputError as error:
         session.message.emit("error", str(error))
-        return
+        return False
     session.document.apply(label, project)
     session.select(path)
+    return True
 
 
 def can_change(session: Session) -> bool:
@@ -47,7 +48,8 @@ def remove(session: Session) -> None:
     if can_change(session):
         paths = _changeable(session)
         what = _name_of(session, paths)
-        apply(session, f"delete {what}", lambda project: scene_edits.remove_all(project, paths))
+        if apply(session, f"delete {what}", lambda project: scene_edits.remove_all(project, paths)):
+            session.message.emit("info", f"deleted {what} (Ctrl+Z brings it back)")
 
 
 def duplicate(session: Session) -> None:

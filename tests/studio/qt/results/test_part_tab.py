@@ -339,6 +339,23 @@ def test_a_measure_is_deleted_by_its_key_and_not_by_chance(panel: ResultsPanel, 
     assert panel.session.project.measures == (gauge,)
 
 
+def test_del_after_a_measure_was_made_or_moved_is_about_it_and_not_about_a_part(
+    panel: ResultsPanel, qtbot: QtBot
+) -> None:
+    panel.activateWindow()
+    qtbot.waitUntil(panel.isActiveWindow)
+    panel.part.start("step")
+    panel.profile.setFocus()
+    for low, high in SIDES:
+        drag(qtbot, panel.profile, 1e3 * low, 1e3 * high)
+    assert panel.focusWidget() is panel.part.table
+    panel.profile.setFocus()
+    panel.part.drawing.moved.emit((SIDES[0], (SIDES[1][0], SIDES[1][1] + 1e-3)))
+    assert panel.focusWidget() is panel.part.table
+    qtbot.keyClick(panel.focusWidget(), Qt.Key.Key_Delete)
+    assert panel.session.project.measures == ()
+
+
 def test_the_axes_stay_while_a_measure_is_placed(panel: ResultsPanel, qtbot: QtBot) -> None:
     """What is measured anew meanwhile moved the places that were just dragged to."""
     panel.part.start("step")

@@ -165,7 +165,9 @@ class TestEditing:
         assert names(session) == ["table", "step block", "step block 2"]
         assert session.selection == (*OBJECTS, 2)
         key(qtbot, tree, Qt.Key.Key_Delete)
-        key(qtbot, tree, Qt.Key.Key_Delete)
+        with qtbot.waitSignal(session.message) as told:
+            key(qtbot, tree, Qt.Key.Key_Delete)
+        assert told.args[1].startswith("deleted") and "Ctrl+Z" in told.args[1]
         assert names(session) == ["table"]
         assert session.selection == (*OBJECTS, 0)
         session.document.undo()
