@@ -32,6 +32,7 @@ from studio.runtime.error_messages import trouble
 from studio.runtime.preferences import PreferencesFile, recovery_folder
 from studio.scan.scan_folder import ScanFolder, image_scale_of, measured_project, open_folder
 from studio.scan.scan_results import holds_scan, is_scan_of, source_of
+from studio.scan.stages import scaled
 
 MAX_NAME = 200
 FILTER = "Blazer project (*.json)"
@@ -56,7 +57,8 @@ def template(key: str, autosave: Autosave) -> Document:
 def _scanned(found: ScanFolder) -> Document:
     """The project of a scan: the file it was made from, or, where that has changed since, what the scan kept of it.
 
-    What it kept is with the measures and settings of its last measurement. InputError: meshes or textures are missing.
+    What it kept is with the measures and settings of its last measurement, and the scanner's own camera wherever that
+    follows from the scan's. InputError: meshes or textures are missing.
     """
     source = source_of(found)
     project = measured_project(found) if source is None else Project.load(source)
@@ -67,9 +69,17 @@ def _scanned(found: ScanFolder) -> Document:
     if source is not None:
         return Document(project, source)
     scale = image_scale_of(found)
+    if _at_full_scale(found) is not None:
+        return Document(scaled(project, 1.0 / scale), None, found.root)
     # its camera is the scan's: the name says so, wherever it is shown or saved
     name = project.name if scale == 1.0 else f"{project.name} at {scale:.3g} x"
     return Document(project.model_copy(update={"name": name[:MAX_NAME]}), None, found.root)
+
+
+def _at_full_scale(found: ScanFolder) -> Project | None:
+    """What was scanned, with the scanner's own camera and exposure; None: rounding has hidden them."""
+    whole = scaled(found.project, 1.0 / image_scale_of(found))
+    return whole if is_scan_of(found, whole) else None
 
 
 def _of_the_images(project: Project, scale: float) -> str:
@@ -168,11 +178,14 @@ class FileActions(QObject):
             left = [] if document.path is None else find_of(self.autosave.folder, document.path)
             if not self._offer(left):
                 self.replace(document)
-                if document.path is None and scale != 1.0:
+                if document.path is None and _at_full_scale(found) is None:
                     self.session.message.emit("info", _of_the_images(document.project, scale))
         # recovered work may be of another scene: the figures are those of the project that was scanned
+        whole, camera = _at_full_scale(found), document.project.scene.camera
         if is_scan_of(found, document.project):
             scan_steps(session).show(found, document.project, scale)
+        elif whole is not None and whole.scene.camera == camera:  # measured in another way since
+            scan_steps(session).show(found, whole, scale)
         else:
             scan_steps(session).show(found)
         self.preferences.add_recent(folder)

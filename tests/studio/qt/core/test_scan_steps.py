@@ -21,6 +21,7 @@ from studio.qt.render import motion_panel
 from studio.qt.render.history import describe
 from studio.qt.render.motion_panel import MotionPanel
 from studio.qt.results.results_panel import ResultsPanel
+from studio.qt.shell import file_actions
 from studio.qt.shell.window import MainWindow
 from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan_folder import image_scale_of, open_folder
@@ -161,9 +162,19 @@ class TestOpened:
         window.take([scanned[1]])
         shown(window, qtbot, 0)
 
+    @pytest.mark.parametrize("rounded", [False, True], ids=["invertible", "rounded"])
     def test_of_an_edited_project_they_come_with_what_was_scanned(
-        self, window: MainWindow, scanned: tuple[Path, Path], qtbot: QtBot, tmp_path: Path
+        self,
+        window: MainWindow,
+        scanned: tuple[Path, Path],
+        qtbot: QtBot,
+        tmp_path: Path,
+        rounded: bool,
+        monkeypatch: pytest.MonkeyPatch,
     ) -> None:
+        if rounded:
+            monkeypatch.setattr(file_actions, "_at_full_scale", lambda found: None)
+        camera = Project.load(scanned[0]).scene.camera
         shutil.copytree(scanned[0].parent, tmp_path / "project", dirs_exist_ok=True)
         folder = Path(shutil.copytree(scanned[1], tmp_path / "scan"))
         for file in (tmp_path / "project").glob("*.json"):
@@ -173,9 +184,11 @@ class TestOpened:
         assert window.files.open(folder)
         render = shown(window, qtbot, 0)
         assert window.workspace == "measure"
-        assert any("stands for" in text and "at 0.5 x" in text for text in told)
+        assert any("stands for" in text and "at 0.5 x" in text for text in told) == rounded
         assert window.session.document.path is None and not window.files.unsaved
-        assert "at 0.5 x" in window.session.project.name
+        assert ("at 0.5 x" in window.session.project.name) == rounded
+        # what is rendered next is of the scanner, whose sides an image at half its scale knows to a pixel
+        assert (abs(window.session.project.scene.camera.width - camera.width) <= 1) != rounded
         assert render.scanner_scale == SCALE and not window.session.stale
         window.files.count_as_saved(window.session.project)
 
