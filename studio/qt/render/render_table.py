@@ -87,6 +87,11 @@ def open_render(session: Session, kept: Kept) -> Render:
     return render
 
 
+def _titled(render: Render, name: str) -> str:
+    """Its figures are those of one step, where it is a scan."""
+    return name if render.scan is None else f"{name}, step {render.frame.step + 1} of {render.scan.count}"
+
+
 class RenderTable(QDialog):
     """A column for each render."""
 
@@ -144,7 +149,7 @@ class RenderTable(QDialog):
         """Columns and rows, by the figures of now."""
         session = self.session
         kept = (as_read_now(one, session.project) for one in self._kept)
-        renders = [*(as_kept(session, render, name) for render, name in self._shown), *kept]
+        renders = [*(as_kept(session, render, _titled(render, name)) for render, name in self._shown), *kept]
         return renders, side_by_side(renders, session.project)
 
     def _refresh(self) -> None:

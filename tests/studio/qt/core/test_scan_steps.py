@@ -20,6 +20,7 @@ from studio.qt.core.session import Render
 from studio.qt.render import motion_panel
 from studio.qt.render.history import describe
 from studio.qt.render.motion_panel import MotionPanel
+from studio.qt.render.render_table import RenderTable
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell import file_actions
 from studio.qt.shell.window import MainWindow
@@ -144,6 +145,13 @@ class TestOpened:
         assert now is not before and opened.session.present(before) is now
         opened.session.renders = []
         assert opened.session.present(before) is None
+
+    def test_in_the_table_of_renders_its_figures_are_those_of_a_step(self, opened: MainWindow, qtbot: QtBot) -> None:
+        render = opened.session.shown
+        assert render is not None and render.scan is not None
+        table = RenderTable(opened, opened.session, [(render, "a scan")])
+        qtbot.addWidget(table)
+        assert table.renders[0].name == f"a scan, step {render.frame.step + 1} of {render.scan.count}"
 
     def test_what_was_changed_since_is_said_to_be_in_the_step_alone(self, opened: MainWindow, qtbot: QtBot) -> None:
         panel = results_of(opened)
