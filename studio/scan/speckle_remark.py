@@ -9,7 +9,6 @@ import numpy as np
 
 from analysis.error import Errors
 from analysis.line.result import Line
-from analysis.report.total import NARROW_PX
 from analysis.report.units import micrometres
 from analysis.triangulate import Points
 from studio.preview.estimates import read_variance
@@ -57,8 +56,6 @@ def _depth_sigma(project: Project, laser: int, one: Measured) -> float:
     """m; NaN where too few points tell."""
     line, points, camera = one.line, one.points, project.scene.camera
     there = np.flatnonzero(points.valid & np.isfinite(one.errors.depth) & ~one.errors.outlier)
-    # of narrower lines the pixels take more of the grains than the profile tells
-    there = there[line.width[points.index[there], points.rank[there]] >= NARROW_PX]
     if len(there) < FEWEST:
         return float("nan")
     some = there[np.unique(np.linspace(0, len(there) - 1, MOST).astype(int))]

@@ -158,7 +158,7 @@ def _exists(session: Session) -> bool:
     return True
 
 
-def _entry(menu: QMenu, text: str, icon: str, handler: Callable[[], None]) -> QAction:
+def _entry(menu: QMenu, text: str, icon: str, handler: Callable[[], object]) -> QAction:
     action = QAction(text, menu)
     if icon:
         action.setIcon(scene_icon(icon))

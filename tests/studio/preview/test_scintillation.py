@@ -33,9 +33,15 @@ def test_fine_grain_moves_a_wide_line_as_the_closed_form_says(sigma: float) -> N
 
 
 @pytest.mark.parametrize(
-    ("f_number", "sigma"), [(1.4, 0.6), (1.4, 0.8), (1.4, 2.0), (2.8, 1.2), (5.6, 1.2), (5.6, 3.0)]
+    ("f_number", "sigma", "within"),
+    [
+        *((1.4, 0.6, 0.06), (1.4, 0.8, 0.06), (1.4, 2.0, 0.06), (2.8, 1.2, 0.06), (5.6, 1.2, 0.06), (5.6, 3.0, 0.06)),
+        *((1.4, 0.25, 0.1), (2.8, 0.3, 0.1), (2.8, 0.4, 0.1), (5.6, 0.25, 0.1), (11.0, 0.3, 0.1)),
+    ],
 )
-def test_a_drawn_pattern_moves_the_fitted_line_as_much_as_foretold(f_number: float, sigma: float) -> None:
+def test_a_drawn_pattern_moves_the_fitted_line_as_much_as_foretold(
+    f_number: float, sigma: float, within: float
+) -> None:
     rows, background = 4000, 300.0
     centre = 40 + np.random.default_rng(3).uniform(-0.5, 0.5, rows)
     field = speckle(NM, camera(f_number).working_f_number, PITCH, True)
@@ -49,7 +55,7 @@ def test_a_drawn_pattern_moves_the_fitted_line_as_much_as_foretold(f_number: flo
         camera(f_number), NM, np.full(rows, sigma), centre, np.full(rows, 8e3), np.full(rows, background), 6.25, True
     )
     # first order in a contrast of up to 0.41; neighbouring rows err alike, which leaves some 3000 for the statistics
-    assert np.std(error) == pytest.approx(np.sqrt(np.mean(told**2)), rel=0.06)
+    assert np.std(error) == pytest.approx(np.sqrt(np.mean(told**2)), rel=within)
 
 
 @pytest.mark.parametrize(("f_number", "sigma", "amplitude"), [(1.4, 0.8, 8e3), (2.8, 1.2, 6e3), (5.6, 1.2, 5e3)])
