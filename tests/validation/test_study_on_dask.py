@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,13 +13,6 @@ from studio.runtime.workers import Engine
 from tests.studio.study.test_run import DATA, run
 
 pytestmark = pytest.mark.validation
-
-
-@pytest.fixture
-def scheduler() -> Iterator[str]:
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local:
-        yield local.scheduler_address
 
 
 def test_a_cluster_gives_the_same_table_as_one_process(scheduler: str, tmp_path: Path) -> None:
