@@ -75,6 +75,8 @@ class CameraView(QWidget):
         self.lines = QWidget()
         self.render_button = QPushButton("Render")
         self.is_live = True
+        self._gave_way = False
+        """The render was shown until the scene changed; it comes back where that is undone."""
         self._ground = ""
         self._chosen = 0
         self._last_shown: Render | None = None
@@ -181,16 +183,21 @@ class CameraView(QWidget):
         new = shown is not self._last_shown
         self._last_shown = shown
         if new:
-            self.is_live = shown is None or self.session.stale
+            self.is_live, self._gave_way = shown is None or self.session.stale, False
             self._read_out(None)
         self._fill_choice()
         self._profile_of_view()
         self.refresh()
 
     def _project_changed(self) -> None:
-        if self.session.shown is not None and self.session.stale and not self.is_live:
-            self.is_live = True
+        changed = self.session.shown is not None and self.session.stale
+        if changed and not self.is_live:
+            self.is_live = self._gave_way = True
             self._fill_choice()
+        elif self._gave_way and not changed:
+            self.is_live = self._gave_way = False
+            self._fill_choice()
+            self.refresh()
         self._show_badge()
 
     def _step_changed(self) -> None:
@@ -212,7 +219,7 @@ class CameraView(QWidget):
         self._show_badge()
 
     def _choose(self, index: int) -> None:
-        self.is_live = index == 0
+        self.is_live, self._gave_way = index == 0, False
         if index > 0:
             self._chosen = index
             self._profile_of_view()

@@ -129,6 +129,18 @@ def test_the_picture_of_a_studys_cell_says_so_beside_the_projects_values(qtbot, 
     assert "5 mW" in made.badge_text.text()
 
 
+def test_what_was_looked_at_comes_back_where_the_change_is_undone(qtbot, made):
+    choose(made, "Light of laser")
+    made.session.set(("scene", "environment", "radiance"), (0.5, 0.5, 0.5))
+    assert made.is_live
+    made.session.document.undo()
+    assert not made.is_live and made.choice.currentText() == "Light of laser"
+    made.session.document.redo()
+    choose(made, "Live estimate")
+    made.session.document.undo()
+    assert made.is_live, "whoever chose the estimate keeps it"
+
+
 def test_exposure_does_not_make_it_stale(qtbot, made):
     made.session.set(("sensor", "exposure_time"), 0.1)
     assert not made.session.stale and not made.is_live
