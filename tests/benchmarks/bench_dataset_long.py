@@ -32,7 +32,7 @@ from tests.benchmarks.bench_dataset import MEGAPIXELS, MEMORY_BAR, parts
 BAR, EFFICIENCY_BAR = 2.5, 0.85
 WATCHED = 0.5
 """s between two looks at the memory."""
-FIRST, COMPARED = 4, 16
+FIRST, COMPARED = 2, 8
 """Scenes that efficiency leaves out, as processes start, and those that it is about."""
 
 
