@@ -115,6 +115,10 @@ class NumberField(TextField):
         self._travelled = 0.0
         self._last = self._pressed
 
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """All of the number: a word ends at its point."""
+        self.selectAll()
+
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._pressed is None:
             super().mouseMoveEvent(event)

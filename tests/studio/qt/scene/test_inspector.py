@@ -184,6 +184,15 @@ class TestDragging:
         session.document.undo()
         assert session.project == first
 
+    def test_a_double_click_takes_the_whole_number(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
+        power = field(inspector, *LASER, "power")
+        session.set((*LASER, "power"), 0.01287)
+        qtbot.mouseClick(power, Qt.MouseButton.LeftButton)
+        qtbot.mouseDClick(power, Qt.MouseButton.LeftButton)
+        qtbot.keyClicks(power, "30")
+        qtbot.keyClick(power, Qt.Key.Key_Return)
+        assert session.project.scene.lasers[0].power == pytest.approx(0.03)
+
     def test_a_click_without_moving_is_no_drag(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
         editor = field(inspector, *LASER, "power")
         qtbot.mouseClick(editor, Qt.MouseButton.LeftButton)
