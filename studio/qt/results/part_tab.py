@@ -269,10 +269,11 @@ class PartTab(QWidget):
         tip = f"<p>{TITLES[gauge.kind]}</p>{DEFINITIONS.get(gauge.kind, '')}"
         if entry is not None:
             _, value, sigma, _, _, whole_verdict, error, ratio = cells(entry)
-            of = "" if entry["readings"] > 1 or not entry["verdict"] else self._steps.of_which(gauge)
+            of = "" if entry["readings"] > 1 else self._steps.of_which(gauge)
             # counts have no room beside a name: the tip has them
             verdict = "not measured" if entry["reason"] else verdict_text(entry["verdict"], entry["oblique"])
-            texts[1:] = [value, sigma, error, f"{verdict}{of}"]
+            judged = entry["verdict"] or entry["reason"] or not of
+            texts[1:] = [value, sigma, error, f"{verdict}{of}" if judged else of.removeprefix(", ")]
             truth = value_text(entry["truth"], entry["sigma"], gauge.unit)
             in_sigmas = "" if ratio == NONE else f" ({ratio} sigma)"
             tip += f"<p>{whole_verdict}{of}</p>" + (

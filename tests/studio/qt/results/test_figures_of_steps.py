@@ -96,6 +96,9 @@ def test_counts_of_all_steps_follow_the_tolerance(panel: ResultsPanel) -> None:
     assert "not measured like this yet: Measure > Measure the scan again" in told.text() and "fail" not in told.text()
     panel.scan_bar.scope.setCurrentIndex(0)
     assert verdict(panel).endswith("fail, step 1"), "all steps were measured otherwise"
+    without = dict.fromkeys(("nominal", "lower", "upper"))
+    session.set(("measures", 0), session.project.measures[0].model_copy(update=without))
+    assert verdict(panel) == "step 1", "its value is no less of one step where nothing is asked of it"
 
 
 def test_a_flatness_is_of_all_steps(panel: ResultsPanel) -> None:
