@@ -87,7 +87,7 @@ def saturated_share(
     """(n,) chance that a pixel of the line exceeds the full well, as its speckle draws it: of lines as in `speckle_px`.
 
     Pixels count as independent, which tells less than a tenth too much where the grain is as large as they are.
-    """  # fmt: skip
+    """
     known = np.isfinite(position) & (sigma > 0.0) & (sigma < WIDEST) & (amplitude > 0.0)
     found = np.zeros(len(sigma))
     if known.any():
