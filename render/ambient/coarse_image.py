@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.ndimage import uniform_filter
@@ -146,7 +147,7 @@ def _held_out(pixels: int, run: Run) -> Int:
 def _shares(film: PixelSamples, grid: Int, across: int) -> Float:
     """(n, 2) samples of each half on the points of a grid over their mean, by the deviation in the other half."""
     variance = film.spread[film.place(grid)].mean(axis=2).reshape(-1, across, 2)
-    deviation = np.sqrt(uniform_filter(variance, (3, 3, 0), mode="nearest")).reshape(-1, 2)[:, ::-1]
+    deviation = np.sqrt(means_about(variance, (3, 3, 0), "nearest")).reshape(-1, 2)[:, ::-1]
     mean = deviation.mean(axis=0)
     relative = np.where(mean > 0.0, deviation / np.where(mean > 0.0, mean, 1.0), 1.0)
     return np.asarray(EVEN_SHARE + (1.0 - EVEN_SHARE) * np.minimum(relative, MOST_SHARE), dtype=np.float64)
@@ -201,9 +202,17 @@ def _tile_means(values: Float32, points: int) -> Float32:
 
     def sums(of: Float32) -> Float32:
         parts = np.pad(of, ends).reshape(tiles[0], points, tiles[1], points).sum(axis=(1, 3))
-        return np.asarray(uniform_filter(parts, 3, mode="constant"), np.float32)
+        return means_about(parts, (3, 3), "constant")
 
     return np.asarray(sums(values) / sums(np.ones_like(values)), np.float32)
+
+
+def means_about(values: Float32, size: tuple[int, ...], beyond: Literal["nearest", "constant"]) -> Float32:
+    """Means of squares over windows of `size`; beyond the edge: as at the edge, or zero.
+
+    Never negative: the filter's running sum leaves a rest of either sign where zeros follow large values.
+    """
+    return np.maximum(uniform_filter(values, size, mode=beyond), np.float32(0.0))
 
 
 def seen_grid(paths: CameraPaths, height: int, block: int, threads: int | None) -> SeenGrid:

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
+from render.ambient.coarse_image import means_about
 from render.ambient.integrator import ambient_image, ambient_images
 from render.ambient.light_group import AmbientLight
 from render.ambient.transport_plan import ONWARD, UNREACHABLE, has_ambient
@@ -216,3 +217,13 @@ def test_an_unfinished_pass_is_kept_where_that_is_wanted(wanted):
         same = np.all(before.radiance == kept.radiance, axis=2).mean()
         assert 0.02 < same < 0.98  # whole tiles of the new pass, the others as they were
         assert np.abs(kept.radiance - before.radiance).mean() < 0.1 * before.radiance.mean()
+
+
+def test_means_of_squares_are_never_negative():
+    values = np.exp(np.random.default_rng(0).normal(0.0, 12.0, (16, 64))).astype(np.float32)
+    values[:, 20:] = 0.0
+    found = means_about(values, (3, 3), "constant")
+    assert found.min() == 0.0
+    around = np.pad(values, 1).astype(np.float64)
+    mean = sum(around[i : i + 16, j : j + 64] for i in range(3) for j in range(3)) / 9.0
+    np.testing.assert_allclose(found[:, :20], mean[:, :20], rtol=1e-3, atol=1e-6 * mean.max())
