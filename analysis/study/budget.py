@@ -9,7 +9,7 @@ for pairs (Shapley 1953, Contributions to the Theory of Games II, 307). Bias add
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,28 +43,37 @@ class Budget:
     """Of all pairs."""
     rest: Interval
     """Of three or more effects at once; 0 within its interval where the terms add up."""
+    own: Interval
+    """Shares of the effects that only the simulation has, together."""
 
     @property
     def adds_up(self) -> bool:
         """The terms and their interaction make the total, within what the repeats tell of it."""
-        own = self.rest
+        rest = self.rest
         known = max(self.total.high - self.total.mean, 0.0)
-        return bool(own.low <= 0.0 <= own.high or abs(own.mean) <= known)
+        return bool(rest.low <= 0.0 <= rest.high or abs(rest.mean) <= known)
 
 
-def budget(total: Float, none: Float, without: Mapping[str, Float], only: Mapping[str, Float]) -> Budget:
+def budget(
+    total: Float,
+    none: Float,
+    without: Mapping[str, Float],
+    only: Mapping[str, Float],
+    of_simulation: Collection[str] = (),
+) -> Budget:
     """(repeats,) of a measure that adds up, in each state; repeat i of all states shares its seed.
 
-    A repeat in which a state measured nothing counts in none.
+    A repeat in which a state measured nothing counts in none. of_simulation: effects that no real scanner has.
     """
     together = np.array([total, none, *without.values(), *only.values()])
     known = np.isfinite(together).all(axis=0)
     total, none = total[known], none[known]
-    terms, alone_sum, met = [], np.zeros(len(total)), np.zeros(len(total))
+    terms, alone_sum, met, own = [], np.zeros(len(total)), np.zeros(len(total)), np.zeros(len(total))
     for effect in without:
         alone, among = only[effect][known] - none, total - without[effect][known]
         alone_sum, met = alone_sum + alone, met + 0.5 * (among - alone)
-        share = mean_interval(0.5 * (alone + among))
-        terms.append(Term(effect, mean_interval(alone), mean_interval(among), share))
+        share = 0.5 * (alone + among)
+        own = own + share if effect in of_simulation else own
+        terms.append(Term(effect, mean_interval(alone), mean_interval(among), mean_interval(share)))
     rest = mean_interval(total - none - alone_sum - met)
-    return Budget(mean_interval(total), mean_interval(none), tuple(terms), mean_interval(met), rest)
+    return Budget(mean_interval(total), mean_interval(none), tuple(terms), mean_interval(met), rest, mean_interval(own))

@@ -25,6 +25,7 @@ from render.base.errors import Cancelled, InputError
 from render.base.kernel_cache import kept_in
 from render.base.threads import Cancel, thread_count
 from render.run import never
+from studio.runtime.memory import return_large_blocks
 
 T = TypeVar("T", bound=Hashable)
 R = TypeVar("R")
@@ -111,6 +112,7 @@ def team(engine: Engine, work: Work[Any, Any], begin: Callable[[], None], cancel
         return
     count = thread_count(engine.workers)
     if count == 1:
+        return_large_blocks()
         begin()
         yield Team(partial(_here, work, cancelled), 1)
         return
@@ -196,6 +198,7 @@ def _begin(begin: Callable[[], None], prepared: Event, stop: Event) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_the_driver, name="end with the driver", daemon=True).start()
     _stopped = stop.is_set
+    return_large_blocks()
     prepared.wait()
     if not stop.is_set():
         begin()

@@ -19,7 +19,7 @@ from studio.scan.stages import scaled
 from studio.study.bounds import Bound, bounds
 from studio.study.cells import Point, along, methods_of, search_of, searched
 from studio.study.edges import Edge, edges_of
-from studio.study.effects import NONE, ONLY, TOTAL, WITHOUT, effects_of
+from studio.study.effects import NONE, OF_SIMULATION, ONLY, TOTAL, WITHOUT, effects_of
 from studio.study.kept import ROW as KEPT_ROW
 from studio.study.measures import MEASURES, measure_of
 from studio.study.ray_units import RAY_SPEED, Throughput, throughput
@@ -194,6 +194,7 @@ def _made(values: Mapping[str, np.ndarray], effects: list[str]) -> Budget:
         values[NONE],
         {name: values[WITHOUT + name] for name in effects},
         {name: values[ONLY + name] for name in effects},
+        OF_SIMULATION,
     )
 
 

@@ -8,12 +8,11 @@ from pathlib import Path
 
 from analysis.report.colour import method_name
 from analysis.study.budget import Budget
-from analysis.study.intervals import Interval
+from analysis.study.intervals import NOTHING, Interval
 from render.base.csv_file import write_csv
 from render.base.files import atomic_write
 from studio.project.strict_json import pretty
 from studio.study.answers import ErrorBudget
-from studio.study.effects import OF_SIMULATION
 from studio.study.labels import interval_text, number_text
 
 HEADER = ("effect", "bias (µm)", "95 % interval", "alone", "variance (%)", "95 % interval", "alone", "among others")
@@ -55,10 +54,10 @@ def sentences_of(budgets: Sequence[ErrorBudget]) -> list[str]:
     return [sentence for one in budgets for sentence in _sentences(one)]
 
 
-def simulation_share(found: ErrorBudget) -> float:
+def simulation_share(found: ErrorBudget) -> Interval:
     """Of the variance, what no real scanner would have."""
-    own = sum(term.share.mean for term in found.variance.terms if term.effect in OF_SIMULATION)
-    return own / found.variance.total.mean if found.variance.total.mean > 0.0 else math.nan
+    own, total = found.variance.own, found.variance.total.mean
+    return Interval(own.mean / total, own.low / total, own.high / total, own.count) if total > 0.0 else NOTHING
 
 
 def _sentences(found: ErrorBudget) -> Iterator[str]:
@@ -77,9 +76,15 @@ def _sentences(found: ErrorBudget) -> Iterator[str]:
         f"half of which counts for each."
     )
     own = simulation_share(found)
+    if own.high < LARGEST:
+        verdict = "below a tenth."
+    elif own.low > LARGEST:
+        verdict = "more than a tenth; ask the render for smaller errors."
+    else:
+        verdict = "too few repeats to tell whether that is below a tenth."
     yield (
-        f"The simulation itself adds {own:+.1%} of the variance (render noise, facets): "
-        + ("below a tenth." if own < LARGEST else "more than a tenth; ask the render for smaller errors.")
+        f"The simulation itself (render noise, facets) adds {own.mean:+.1%} of the variance "
+        f"({_interval(own, 100.0)} %): {verdict}"
     )
     for what, one in (("bias", found.bias), ("variance", found.variance)):
         if not one.adds_up:
@@ -95,6 +100,7 @@ def _named(found: Budget) -> Iterator[tuple[str, Interval, float, float]]:
     yield "three or more at once", found.rest, math.nan, math.nan
     yield "total", found.total, math.nan, math.nan
     yield "of which interaction of pairs", found.interaction, math.nan, math.nan
+    yield "of which the simulation itself", found.own, math.nan, math.nan
 
 
 def _rows(found: ErrorBudget) -> Iterator[list[str | float | None]]:

@@ -74,8 +74,8 @@ def application() -> QApplication:
     from PySide6.QtGui import QGuiApplication, QSurfaceFormat
     from PySide6.QtWidgets import QApplication
 
-    from studio.qt.shell.memory import return_large_blocks
     from studio.qt.shell.overrides import let_faults_out
+    from studio.runtime.memory import return_large_blocks
 
     let_faults_out()
     there = QApplication.instance()

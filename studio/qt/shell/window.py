@@ -38,7 +38,6 @@ from studio.qt.shell.escape import escape
 from studio.qt.shell.file_actions import FileActions
 from studio.qt.shell.going import what_goes
 from studio.qt.shell.help import Help, panel_with_focus
-from studio.qt.shell.memory import return_what_is_free
 from studio.qt.shell.motion_calls import join_motion
 from studio.qt.shell.panels import PANELS, Making, Panels
 from studio.qt.shell.preferring import Preferring
@@ -59,6 +58,7 @@ from studio.qt.shell.workspaces import (
 from studio.qt.study.cell_opener import CellOpener
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job
+from studio.runtime.memory import return_what_is_free
 from studio.runtime.preferences import PreferencesFile
 from studio.runtime.version import version
 

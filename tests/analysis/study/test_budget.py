@@ -29,6 +29,7 @@ def made(three: float = 0.0, noise: float = 0.01) -> Budget:
         value(set()),
         {name: value(everything - {name}) for name in ALONE},
         {name: value({name}) for name in ALONE},
+        of_simulation=("b", "c"),
     )
 
 
@@ -43,6 +44,14 @@ def test_effects_and_pairs_are_found_and_add_up() -> None:
     whole = found.floor.mean + sum(term.share.mean for term in found.terms) + found.rest.mean
     assert whole == pytest.approx(found.total.mean, abs=1e-9)
     assert found.adds_up and abs(found.rest.mean) < 0.05
+
+
+def test_what_the_simulation_itself_makes_is_the_share_of_its_effects_repeat_by_repeat() -> None:
+    found = made()
+    b, c = (term.share for term in found.terms[1:])
+    assert found.own.mean == pytest.approx(b.mean + c.mean, abs=1e-12)
+    assert found.own.low < ALONE["b"] + ALONE["c"] + 3.0 / 2.0 - 0.5 < found.own.high
+    assert found.own.high - found.own.low < 0.1
 
 
 def test_what_three_make_at_once_is_no_ones_share() -> None:

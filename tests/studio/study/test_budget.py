@@ -68,7 +68,7 @@ def test_show_writes_the_waterfall_and_the_same_numbers_as_csv_and_json(folder: 
     done = CliRunner().invoke(main.cli, ["study", "show", str(folder), "--json"])
     assert done.exit_code == 0, done.output
     said = " ".join(json.loads(done.stdout)["findings"]["budget"])
-    assert "The simulation itself adds" in said and "Effects that meet" in said
+    assert "The simulation itself" in said and "Effects that meet" in said
     assert (folder / "chart_1.png").stat().st_size > 10_000
     rows = list(csv.DictReader((folder / "budget_1.csv").open()))
     data = json.loads((folder / "budget_1.json").read_text())["budget"]
@@ -154,3 +154,18 @@ def test_a_row_that_takes_a_ghost_for_the_line_is_counted_and_makes_no_budget() 
     said = sentences_of([ErrorBudget("likelihood", found, found, wrong_rows=0.004)])
     assert any("0.40% of the rows are measured wrong" in one for one in said)
     assert not any("measured wrong" in one for one in sentences_of([ErrorBudget("likelihood", found, found)]))
+
+
+@pytest.mark.parametrize(
+    ("facets", "verdict"),
+    [
+        ([0.00, 0.01, 0.02, 0.01], "below a tenth"),
+        ([0.20, 0.21, 0.22, 0.21], "more than a tenth"),
+        ([-0.1, 0.05, 0.2, 0.1], "too few repeats to tell"),
+    ],
+)
+def test_the_simulation_s_share_has_a_verdict_where_the_repeats_allow_one(facets: list[float], verdict: str) -> None:
+    total, own = np.full(4, 1e-10), 1e-10 * np.array(facets)
+    found = budget(total, 0.0 * own, {"facets": total - own}, {"facets": own}, ("facets",))
+    (said,) = (one for one in sentences_of([ErrorBudget("likelihood", found, found)]) if "simulation itself" in one)
+    assert verdict in said

@@ -1,4 +1,4 @@
-"""Large arrays go back to the system when they are freed.
+"""Large arrays go back to the system when they are freed: of the window, and of workers that render by the thousand.
 
 The GNU allocator learns from each freed array to keep such sizes for itself, in an arena for each thread: after some
 renders it holds hundreds of megabytes that nobody uses. Fixed limits stop it from learning.
