@@ -15,14 +15,18 @@ from render.base.files import atomic_write
 from render.base.threads import Cancel
 from studio.dataset.contact_sheet import Picture, pictures
 from studio.dataset.folder import images_in, is_of
+from studio.dataset.own_recipe import check_place, recipe_of, suggested_draw
 from studio.dataset.recipe import Recipe, base_of
 from studio.dataset.run import Result, Wanted, make_dataset
+from studio.editing.forms import FieldSpec
+from studio.project.document import FieldPath
 from studio.project.project import Project
 from studio.project.strict_json import pretty
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.long_work import LongWork
 from studio.qt.core.session import Session
 from studio.runtime.jobs import Progress
+from studio.study.draft import path_text
 from studio.study.folder_run import in_window
 
 REST_MS = 400
@@ -76,12 +80,39 @@ class DatasetWork(LongWork):
         self._change(recipe)
         self.state_changed.emit()
 
+    def begin_with_project(self) -> None:
+        """A recipe of the open project, as it was saved, that draws nothing yet."""
+        document = self.session.document
+        if document.path is None:
+            self.session.message.emit("warning", "Save the project first: its recipe names the project's file")
+            return
+        recipe, self.root = recipe_of(document.path, document.project.name)
+        self.name, self.folder = f"{document.path.stem} recipe", None
+        self._change(recipe)
+        self.state_changed.emit()
+        if document.dirty:
+            self.session.message.emit("warning", "The recipe is of the project as it was saved, without later changes")
+
+    def add(self, path: FieldPath, spec: FieldSpec) -> None:
+        """Another field is drawn."""
+        field = path_text(path)
+        if any(one.field == field for one in self.recipe.draw):
+            self.session.message.emit("info", f"{spec.label} is drawn already")
+            return
+        draws = [*self.recipe.draw, suggested_draw(field, spec)]
+        fixed = {name: value for name, value in self.recipe.set.items() if name != field}
+        self.set_recipe(draw=[one.model_dump() for one in draws], set=fixed)
+
+    def remove(self, number: int) -> None:
+        """A field is as in the base project again."""
+        self.set_recipe(draw=[one.model_dump() for k, one in enumerate(self.recipe.draw) if k != number])
+
     def set_range(self, number: int, low: float, high: float) -> None:
         """Another range of a field that is drawn."""
         self._replace(number, {"low": low, "high": high})
 
     def set_recipe(self, **values: object) -> None:
-        """Another seed, or number of images of each scene."""
+        """Others of the recipe's own values, as its seed."""
         self._checked({**self.recipe.model_dump(), **values})
 
     def look(self) -> None:
@@ -112,6 +143,7 @@ class DatasetWork(LongWork):
         """Write the recipe's file; False: told in `problem`, nothing is written."""
         data = self.recipe.model_dump(mode="json", exclude_defaults=True)
         try:
+            check_place(self.recipe, self.root, file.parent)
             with atomic_write(file) as temporary:
                 temporary.write_text(pretty({"schema_version": 1, **data}) + "\n", encoding="utf-8")
         except InputError as error:

@@ -14,6 +14,7 @@ from studio.editing.forms import PLAIN
 from studio.editing.units import Unit
 from studio.project.project import Project
 from studio.qt.core.boxes import StillBox
+from studio.qt.core.icons import icon_button
 from studio.qt.core.widgets import ElidedLabel
 from studio.qt.forms.unit_box import UnitBox
 
@@ -36,6 +37,7 @@ class DrawRow(QWidget):
     """The slider spans the range that the recipe's file has, and half of it on either side."""
 
     chosen = Signal(float, float)
+    removed = Signal()
     refused = Signal(str)
     """Why what was typed is not taken over."""
 
@@ -49,7 +51,9 @@ class DrawRow(QWidget):
         layout = QGridLayout(self)
         layout.setContentsMargins(0, 2, 0, 2)
         layout.setColumnStretch(1, 1)
-        layout.addWidget(self.name, 0, 0, 1, 3)
+        self.remove = icon_button("cancel", f"No longer draw {label}", self.removed.emit)
+        layout.addWidget(self.name, 0, 0, 1, 2)
+        layout.addWidget(self.remove, 0, 2, Qt.AlignmentFlag.AlignRight)
         self.boxes: tuple[UnitBox, ...] = ()
         if draw.kind not in RANGED or draw.low is None or draw.high is None:
             told = QLabel(said(draw, unit, base), wordWrap=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
@@ -19,6 +20,7 @@ from studio.dataset.field_names import field_name
 from studio.dataset.images import images_of
 from studio.dataset.recipe import MOST_VARIANTS, ready_made
 from studio.editing.forms import PLAIN
+from studio.project.templates import DESCRIPTIONS
 from studio.qt.core.boxes import WholeBox
 from studio.qt.core.folders import ask_results_folder
 from studio.qt.core.jobs import JobRunner
@@ -27,9 +29,11 @@ from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import ElidedLabel, Scrolled, flush, text_button
 from studio.qt.dataset.dataset_work import DatasetWork
 from studio.qt.dataset.draw_row import DrawRow
+from studio.qt.scene.field_menu import fill_field_menu
 from studio.runtime.jobs import Job
 
 ALL_THERE = "; a higher number of scenes makes more"
+NOTHING_DRAWN = "Nothing is drawn yet, and all scenes are alike: add what is to be drawn of the project."
 FILES = "Recipes (*.json);;All files (*)"
 
 
@@ -49,6 +53,10 @@ class RecipePanel(QWidget):
         self.about = QLabel(wordWrap=True)
         self.about.setObjectName("muted")
         self.rows: list[DrawRow] = []
+        self.add = text_button("Draw a field", "Every field of the recipe's project")
+        fields = QMenu(self.add)
+        fields.aboutToShow.connect(partial(self._fill_fields, fields))
+        self.add.setMenu(fields)
         self.scenes = WholeBox(minimum=1, maximum=10_000_000, value=self.work.scenes)
         self.scenes.setToolTip("Each is rendered once")
         self.images = WholeBox(minimum=1, maximum=MOST_VARIANTS)
@@ -66,7 +74,7 @@ class RecipePanel(QWidget):
         """Follow the recipe."""
         recipe = self.work.recipe
         self.name.setText(recipe.name)
-        self.about.setText(recipe.about)
+        self.about.setText(recipe.about or ("" if recipe.draw else NOTHING_DRAWN))
         for box, value in ((self.images, recipe.images), (self.seed, recipe.seed)):
             box.blockSignals(True)
             box.setValue(min(value, box.maximum()))
@@ -104,6 +112,7 @@ class RecipePanel(QWidget):
         ]
         for number, row in enumerate(self.rows):
             row.chosen.connect(partial(self.work.set_range, number))
+            row.removed.connect(partial(self.work.remove, number))
             row.refused.connect(partial(self.session.message.emit, "warning"))
             self.inside.insertWidget(number, row)
 
@@ -112,8 +121,13 @@ class RecipePanel(QWidget):
         for name in ready_made():
             menu.addAction(name.replace("_", " ").capitalize(), partial(self.work.load, name))
         menu.addSeparator()
+        menu.addAction("Of the open project", self.work.begin_with_project)
         menu.addAction("Open a recipe…", self._open)
         menu.addAction("Save the recipe…", self._save)
+
+    def _fill_fields(self, menu: QMenu) -> None:
+        if self.work.base is not None:
+            fill_field_menu(menu, self.work.base, self.work.add)
 
     def _open(self) -> None:
         chosen, _ = QFileDialog.getOpenFileName(self, "Open a recipe", self._place(), FILES)
@@ -127,6 +141,8 @@ class RecipePanel(QWidget):
             self.work.save(Path(chosen))
 
     def _place(self) -> str:
+        if self.work.recipe.base not in DESCRIPTIONS:
+            return str(self.work.root)
         path = self.session.document.path
         return str(path.parent if path is not None else Path.home())
 
@@ -161,6 +177,7 @@ class RecipePanel(QWidget):
         self.foot.run.setToolTip(f"Every image is there{ALL_THERE}" if whole else "")
         for widget in (self.files, self.scenes, self.images, self.seed, *self.rows):
             widget.setEnabled(not work.running)
+        self.add.setEnabled(not work.running and work.base is not None)
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()
@@ -181,6 +198,7 @@ class RecipePanel(QWidget):
         foot = QVBoxLayout()
         foot.setContentsMargins(8, 4, 8, 8)
         foot.setSpacing(4)
+        foot.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
         foot.addLayout(counts)
         foot.addWidget(self.told)
         foot.addWidget(self.foot)

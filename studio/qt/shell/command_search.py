@@ -13,8 +13,8 @@ from PySide6.QtWidgets import QDialog, QLineEdit, QListWidget, QListWidgetItem, 
 
 from studio.project.document import FieldPath
 from studio.qt.core import theme
+from studio.qt.scene.field_menu import named_fields
 from studio.qt.scene.scene_nodes import nodes
-from studio.qt.study.field_menu import named_fields
 from studio.runtime.word_search import found
 
 if TYPE_CHECKING:

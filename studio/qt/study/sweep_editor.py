@@ -29,7 +29,7 @@ from studio.qt.core.widgets import text_button
 from studio.qt.forms.fields import ChoiceField
 from studio.qt.forms.number_field import NumberField
 from studio.qt.image.line_overlay import ticked_swatch
-from studio.qt.study.field_menu import fill_field_menu
+from studio.qt.scene.field_menu import add_board_fields, fill_field_menu
 from studio.qt.study.parameter_row import ParameterRow, kind_of
 from studio.qt.study.study_work import StudyWork
 from studio.study.draft import spec_of
@@ -81,7 +81,7 @@ class SweepEditor(QWidget):
             "Vary a field", "Every field of the project; the same is in the menu of each field of the inspector"
         )
         menu = QMenu(self.add)
-        menu.aboutToShow.connect(lambda: fill_field_menu(menu, work.session, work.project()))
+        menu.aboutToShow.connect(partial(self._fill_fields, menu))
         self.add.setMenu(menu)
         self.sampling, self.chart = ChoiceField(SAMPLINGS), ChoiceField(CHARTS)
         self.samples = WholeBox(minimum=2, maximum=65536)
@@ -106,6 +106,11 @@ class SweepEditor(QWidget):
         work.draft_changed.connect(self.refresh)
         work.session.project_changed.connect(self._follow_project)
         self.refresh()
+
+    def _fill_fields(self, menu: QMenu) -> None:
+        asked = self.work.session.vary_asked.emit
+        fill_field_menu(menu, self.work.project(), asked)
+        add_board_fields(menu, asked)
 
     def refresh(self) -> None:
         """Follow the draft."""

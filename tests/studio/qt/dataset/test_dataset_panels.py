@@ -18,6 +18,8 @@ from studio.qt.dataset.dataset_work import DatasetWork
 from studio.qt.dataset.draw_row import DrawRow
 from studio.qt.dataset.recipe_panel import RecipePanel
 from studio.runtime.workers import Engine
+from studio.study.draft import spec_of
+from studio.study.study import parts_of
 from tests.studio.qt.small_session import small_session
 
 SMALL = Recipe(
@@ -165,3 +167,57 @@ def test_a_saved_recipe_is_what_was_shown(desk: Desk, tmp_path: Path) -> None:
     assert desk.work.save(file)
     assert Recipe.load(file)[0] == desk.work.recipe
     assert (desk.work.recipe.images, desk.work.recipe.draw[0].high) == (5, 0.2)
+
+
+def test_the_open_project_becomes_a_recipe_field_by_field(desk: Desk, qtbot: QtBot, tmp_path: Path) -> None:
+    desk.session.document.save(tmp_path / "part.json")
+    desk.work.begin_with_project()
+    assert desk.work.recipe.base == "part.json" and not desk.panel.rows
+    assert "Nothing is drawn yet" in desk.panel.about.text()
+    for field in ("scene.rig.lasers[0].power", "sensor.speckle", "sensor.bits"):
+        add_field(desk, field)
+    power, speckle, bits = desk.work.recipe.draw
+    now = desk.session.document.project.scene.lasers[0].power
+    assert power.kind == "logarithmic" and power.low < now < power.high
+    assert speckle.kind == "choice" and "polarised" in speckle.values
+    assert bits.kind in ("choice", "integer")
+    desk.panel.rows[2].remove.click()
+    assert [row.draw.field for row in desk.panel.rows] == ["scene.rig.lasers[0].power", "sensor.speckle"]
+    qtbot.waitUntil(lambda: desk.ready)
+    assert not desk.work.problem
+    other = tmp_path / "elsewhere"
+    other.mkdir()
+    assert not desk.work.save(other / "mine.json") and "part.json" in desk.work.problem
+    assert not list(other.iterdir())
+    assert desk.work.save(tmp_path / "mine.json")
+    assert Recipe.load(tmp_path / "mine.json") == (desk.work.recipe, tmp_path)
+
+
+def test_a_field_is_drawn_once(desk: Desk) -> None:
+    add_field(desk, "scene.rig.lasers[0].power")
+    assert desk.work.recipe == SMALL
+    add_field(desk, "render.laser_error")  # which the recipe had fixed
+    assert [one.field for one in desk.work.recipe.draw[3:]] == ["render.laser_error"]
+    assert "render.laser_error" not in desk.work.recipe.set
+
+
+def test_a_project_that_was_never_saved_has_no_file_to_name(desk: Desk) -> None:
+    told = []
+    desk.session.message.connect(lambda level, text: told.append(text))
+    desk.work.begin_with_project()
+    assert desk.work.recipe == SMALL
+    assert told == ["Save the project first: its recipe names the project's file"]
+
+
+def test_the_menu_of_fields_is_that_of_the_recipe_s_project(desk: Desk) -> None:
+    menu = desk.panel.add.menu()
+    menu.aboutToShow.emit()
+    assert "plane" in [action.text() for action in menu.actions()]
+
+
+def add_field(desk: Desk, field: str) -> None:
+    """As its entry in the menu does."""
+    assert desk.work.base is not None
+    spec = spec_of(desk.work.base, field)
+    assert spec is not None
+    desk.work.add(tuple(parts_of(field)), spec)

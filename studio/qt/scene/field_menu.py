@@ -1,7 +1,8 @@
-"""A menu of every field of the project that a study can vary, by what of the scene it belongs to; and of its boards."""
+"""A menu of every field of a project that a study can vary or a recipe draw, by what of the scene it belongs to."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtWidgets import QMenu
@@ -9,7 +10,6 @@ from PySide6.QtWidgets import QMenu
 from studio.editing.forms import FieldSpec
 from studio.project.document import FieldPath
 from studio.project.project import Project
-from studio.qt.core.session import Session
 from studio.qt.scene.scene_nodes import nodes
 from studio.study.draft import board_fields, fields_of
 
@@ -27,14 +27,18 @@ def named_fields(project: Project, item: FieldPath) -> list[tuple[FieldPath, Fie
     return found
 
 
-def fill_field_menu(menu: QMenu, session: Session, project: Project) -> None:
-    """One submenu for each item of the scene tree; a field's entry asks the session to vary it."""
+def fill_field_menu(menu: QMenu, project: Project, chosen: Callable[[FieldPath, FieldSpec], None]) -> None:
+    """One submenu for each item of the scene tree; each field's entry tells that it was chosen."""
     menu.clear()
     for node in nodes(project):
         fields = named_fields(project, node.path) if node.path else []
         below = menu.addMenu(node.name) if fields else menu
         for path, spec, name in fields:
-            below.addAction(name, partial(session.vary_asked.emit, path, spec)).setToolTip(spec.help)
+            below.addAction(name, partial(chosen, path, spec)).setToolTip(spec.help)
+
+
+def add_board_fields(menu: QMenu, chosen: Callable[[FieldPath, FieldSpec], None]) -> None:
+    """Another submenu, of the boards that a study calibrates by."""
     below = menu.addMenu("Calibration")
     for path, spec in board_fields():
-        below.addAction(spec.label, partial(session.vary_asked.emit, path, spec)).setToolTip(spec.help)
+        below.addAction(spec.label, partial(chosen, path, spec)).setToolTip(spec.help)
