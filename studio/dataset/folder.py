@@ -11,6 +11,8 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,12 +21,13 @@ from pathlib import Path
 from typing import Any
 
 from render.base.errors import InputError
-from render.base.files import atomic_write, read_bytes, sha256
+from render.base.files import atomic_write, read_bytes, sha256, unfinished_write
 from studio.dataset.images import IMAGES, LABELS, MAPS, OBJECTS, images_of, name_of
 from studio.dataset.recipe import Recipe
 from studio.project.project import Project
 from studio.project.strict_json import read_object
 
+IMAGE = re.compile(r"[0-9]+\.(png|exr|json)")
 ABOUT, INDEX, CARD = "dataset.json", "index.csv", "card.md"
 MOST_LABEL_BYTES = 2**26
 COLUMNS = ("image", "scene", "split", "fired", "file", "sha256", "labels", "labels_sha256")
@@ -125,6 +128,16 @@ def begun(folder: Path, recipe: Recipe, base: Project) -> Dataset:
 def images_in(folder: Path) -> list[int]:
     """The images that a folder holds whole, in order."""
     return sorted(int(path.stem) for path in (folder / LABELS).glob("[0-9]*/[0-9]*.json"))
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove what killed programs left of files that they were writing; only for the one that holds the folder."""
+    kinds = [folder / kind for kind in (IMAGES, OBJECTS, MAPS, LABELS)]
+    for place in (folder, *(below for kind in kinds for below in kind.glob("[0-9]*"))):
+        for name in os.listdir(place):
+            target = unfinished_write(name)
+            if target is not None and (target in (ABOUT, INDEX, CARD) if place == folder else IMAGE.fullmatch(target)):
+                (place / name).unlink(missing_ok=True)
 
 
 def opened(folder: Path) -> Dataset:

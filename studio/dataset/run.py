@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from render.base.threads import Cancel
-from studio.dataset.folder import Dataset, begun, images_in, take_from, write_index
+from studio.dataset.folder import Dataset, begun, images_in, remove_unfinished, take_from, write_index
 from studio.dataset.images import Task, make
 from studio.dataset.recipe import Recipe, base_of
 from studio.dataset.scenes import drawn_scene
@@ -71,6 +71,7 @@ def make_dataset(
     out.mkdir(parents=True, exist_ok=True)
     with hold(out):
         dataset = begun(out, recipe, base)
+        remove_unfinished(out)
         for source in wanted.sources:
             take_from(dataset, source)
         scenes = range(wanted.shard.number - 1, wanted.scenes, wanted.shard.count)

@@ -92,6 +92,20 @@ def test_what_a_stop_left_out_is_made_and_the_rest_stays(whole: Path, tmp_path: 
     assert contents(tmp_path) == contents(whole)
 
 
+def test_what_a_kill_left_half_written_goes_and_files_of_others_stay(whole: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(whole, out)
+    left = [out / "maps" / "00000" / ".00000005.453549b0.exr", out / ".index.0123abcd.csv"]
+    kept = out / "images" / "00000" / ".notes.453549b0.png"
+    for path in (*left, kept):
+        path.write_bytes(b"half")
+    make_dataset(RECIPE, Path(), Wanted(SCENES), out, engine=HERE)
+    assert kept.read_bytes() == b"half"
+    kept.unlink()
+    assert not any(path.exists() for path in left)
+    assert contents(out) == contents(whole)
+
+
 def test_two_processes_give_the_same_bytes(whole: Path, tmp_path: Path) -> None:
     make_dataset(RECIPE, Path(), Wanted(SCENES), tmp_path, engine=Engine(workers=2))
     assert contents(tmp_path) == contents(whole)
