@@ -9,7 +9,7 @@ import secrets
 import stat
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PureWindowsPath
 
@@ -78,6 +78,21 @@ def remove_unfinished(target: Path, seconds: float = ABANDONED) -> None:
             left = target.with_name(name)
             if unfinished_write(name) == target.name and time.time() - left.stat().st_mtime > seconds:
                 left.unlink()
+
+
+def remove_all_unfinished(folder: Path, is_own: Callable[[str], object]) -> None:
+    """Remove what killed programs left of files in `folder` that are ours by their names.
+
+    Only for the one program that may write there now. InputError: the folder cannot be read or written.
+    """
+    try:
+        for name in os.listdir(folder):
+            target = unfinished_write(name)
+            if target is not None and is_own(target):
+                (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        what = "what a program that was killed left half-written cannot be removed"
+        raise InputError(what, where=str(folder), found=error.strerror or error, cure="remove it by hand") from None
 
 
 def inside(root: Path, relative: str, where: str) -> Path:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -21,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from render.base.errors import InputError
-from render.base.files import atomic_write, read_bytes, sha256, unfinished_write
+from render.base.files import atomic_write, read_bytes, remove_all_unfinished, sha256
 from studio.dataset.images import IMAGES, LABELS, MAPS, OBJECTS, images_of, name_of
 from studio.dataset.recipe import Recipe
 from studio.project.project import Project
@@ -131,13 +130,11 @@ def images_in(folder: Path) -> list[int]:
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Remove what killed programs left of files that they were writing; only for the one that holds the folder."""
-    kinds = [folder / kind for kind in (IMAGES, OBJECTS, MAPS, LABELS)]
-    for place in (folder, *(below for kind in kinds for below in kind.glob("[0-9]*"))):
-        for name in os.listdir(place):
-            target = unfinished_write(name)
-            if target is not None and (target in (ABOUT, INDEX, CARD) if place == folder else IMAGE.fullmatch(target)):
-                (place / name).unlink(missing_ok=True)
+    """Remove what killed programs left half-written; only for the one that holds the folder."""
+    remove_all_unfinished(folder, (ABOUT, INDEX, CARD).__contains__)
+    for kind in (IMAGES, OBJECTS, MAPS, LABELS):
+        for below in (folder / kind).glob("[0-9]*"):
+            remove_all_unfinished(below, IMAGE.fullmatch)
 
 
 def opened(folder: Path) -> Dataset:

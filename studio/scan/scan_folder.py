@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, TypeGuard
 
 from render.base.errors import InputError
-from render.base.files import atomic_write, inside, sha256, unfinished_write
+from render.base.files import atomic_write, inside, remove_all_unfinished, sha256
 from studio.project.input_files import check_unchanged, listed
 from studio.project.project import READ_OFF, Project
 from studio.project.strict_json import pretty, read_object
@@ -314,11 +314,7 @@ def _clear(folder: Path, count: int, reads: list[Path], *, keep_frames: bool) ->
 
 
 def _remove_unfinished(folder: Path) -> None:
-    """Remove what killed programs left of files that they were writing; this one alone writes there now."""
-    for name in os.listdir(folder):
-        target = unfinished_write(name)
-        if target is not None and (FRAME.fullmatch(target) or target in (MANIFEST, PROJECT, *POINTS, *REPORT)):
-            (folder / name).unlink(missing_ok=True)
+    remove_all_unfinished(folder, lambda name: FRAME.fullmatch(name) or name in (MANIFEST, PROJECT, *POINTS, *REPORT))
 
 
 def _check_project(folder: Path, reads: list[Path]) -> None:

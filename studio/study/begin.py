@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from render.base.errors import InputError
+from render.base.files import remove_all_unfinished
 from render.base.full_disk import require_room
 from studio.project.project import Project
 from studio.runtime.workers import Engine
@@ -18,6 +20,9 @@ from studio.study.study import Study
 
 ROW_BYTES, CHART_BYTES = 2500, 250_000
 """On disk: of a cell in the store and the tables, and of a sweep's chart alone and in the page."""
+
+RESULT = re.compile(r"(study|table|times|references|(chart|budget|bounds|boundary)_[0-9]+)\.[a-z]+")
+"""Files made of the store."""
 
 
 @contextmanager
@@ -36,6 +41,7 @@ def begin(
     require_room(folder, study_bytes(study, len(cells)) - there, "the study")
     _check_alike(folder, study, bases)
     with hold(folder), Store(folder, study.digest(bases)) as store:
+        remove_all_unfinished(folder, RESULT.fullmatch)
         store.describe(study, bases)
         yield store
 

@@ -241,6 +241,19 @@ def test_a_disk_without_room_for_the_study_is_told_before_anything_runs(
     assert not out.exists()
 
 
+def test_what_a_kill_left_half_written_goes_and_files_of_others_stay(tmp_path: Path) -> None:
+    chosen, out = study(), tmp_path / "out"
+    bases = chosen.bases(tmp_path)
+    out.mkdir()
+    left = [out / ".table.0123abcd.parquet", out / ".chart_1.0123abcd.png", out / ".bounds_2.0123abcd.csv"]
+    kept = [out / ".notes.0123abcd.csv", out / "notes.csv"]
+    for path in (*left, *kept):
+        path.write_bytes(b"half")
+    with begin(out, chosen, bases, HERE):
+        assert not any(path.exists() for path in left)
+    assert all(path.read_bytes() == b"half" for path in kept)
+
+
 def command(*words: object) -> list[str]:
     """A study in a program of its own, which can be killed."""
     return [sys.executable, str(ROOT / "main.py"), "study", *map(str, words)]
