@@ -61,7 +61,8 @@ class PartSteps:
         scan, told = render.scan, f"Of step {render.frame.step + 1} of {render.scan.count}."
         if gauge is not None and gauge.of_scan:
             return f"Of all {scan.count} steps together, as measured last." if kept else ""
-        if scan.measured_as.measured_in != self._session.project.measured_in:
+        otherwise = scan.measured_as.measured_in != self._session.project.measured_in
+        if otherwise and scan.measured_as.measures:
             return f"{told} All steps were measured in another section: {AGAIN}."
         if gauge is None:
             together = "; flatness of all steps together" if any(one.of_scan for one in gauges) else ""

@@ -101,6 +101,17 @@ def test_counts_of_all_steps_follow_the_tolerance(panel: ResultsPanel) -> None:
     assert verdict(panel) == "step 1", "its value is no less of one step where nothing is asked of it"
 
 
+def test_steps_without_measures_were_not_measured_in_another_section(
+    panel: ResultsPanel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session, told, scan = panel.session, panel.part.told, panel.session.shown.scan
+    panel.part.table.selectRow(0)
+    bare = scan.measured_as.model_copy(update={"measures": ()})
+    monkeypatch.setitem(vars(scan), "measured_as", bare)  # as a scan without measures keeps it
+    session.set(("measured_in",), "across_x" if bare.measured_in != "across_x" else "across_y")
+    assert "not measured like this yet" in told.text() and "another section" not in told.text()
+
+
 def test_a_flatness_is_of_all_steps(panel: ResultsPanel) -> None:
     told = panel.part.told
     panel.part.table.selectRow(1)
