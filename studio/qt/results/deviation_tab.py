@@ -292,7 +292,9 @@ class DeviationTab(QWidget):
             self.told.setText(job.problem.text)
 
     def _choose(self) -> None:
-        chosen, _ = QFileDialog.getOpenFileName(self.window(), "Nominal part", str(self.session.document.root), FILES)
+        path = self.session.document.path
+        start = Path.home() if path is None else path.parent  # a copy that was recovered lies among the program's own
+        chosen, _ = QFileDialog.getOpenFileName(self.window(), "Nominal part", str(start), FILES)
         if chosen:
             self.take_nominal(Path(chosen))
 
