@@ -51,7 +51,8 @@ def test_the_buttons_stay_where_they_are_while_texts_come_and_go(window: MainWin
     def work(progress: Progress, cancelled: Cancel) -> None:
         progress("plan", 0.0)
         go.wait(60)
-        progress("reflected light of the laser, frame 3 of 8", 0.6)
+        # so little that the time left is still told where the window is drawn once a second
+        progress("reflected light of the laser, frame 3 of 8", 0.1)
         done.wait(60)
 
     window.runner.run("render", "render", work)
