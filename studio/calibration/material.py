@@ -25,6 +25,8 @@ from studio.project.project import Project
 
 VIEWS, SEED, SIGMA, MOST_TILT = 20, 0, 0.05, float(np.radians(45.0))
 """Of virtual boards: how many, of which draw, px of corners and lines, rad."""
+LEAST_SPAN, NOWHERE = 0.1, 0.2
+"""Of the middle of the depths: how far virtual boards reach to either side of it at least, and where no line is."""
 LASER_STEP = 8
 """Rows from a virtual line's point to the next."""
 
@@ -188,14 +190,35 @@ def with_faults(error: InputError, material: Material) -> InputError:
 
 
 def board_distances(project: Project, nearest: float | None, farthest: float | None) -> tuple[float, float]:
-    """m, of virtual boards: as asked, else 0.8 to 1.2 of where the first laser meets the camera's axis.
+    """m, of virtual boards: as asked, else where the lines lie on the parts, LEAST_SPAN about their middle at least.
 
-    InputError: the farthest is not beyond the nearest.
+    Without a line: about where the first laser meets the camera's axis. InputError: the farthest is not beyond the
+    nearest.
     """
-    plane = project.scene.laser_plane(0) if project.scene.lasers else np.array([0.0, 0.0, 1.0, -1.0])
-    middle = -plane[3] / plane[2] if abs(plane[2]) > 1e-6 and -plane[3] / plane[2] > 0.0 else 1.0
-    first = nearest or 0.8 * float(middle)
-    last = farthest or max(1.2 * float(middle), 1.2 * first)
+    first, last = nearest, farthest
+    if first is None or last is None:
+        low, high = line_depths(project)
+        middle = 0.5 * (low + high)
+        first = first or min(low, (1.0 - LEAST_SPAN) * middle)
+        last = last or max(high, (1.0 + LEAST_SPAN) * middle, (1.0 + 2.0 * LEAST_SPAN) * first)
     if last <= first:
         raise InputError("the farthest distance is not beyond the nearest", where="--farthest", found=last)
     return first, last
+
+
+def line_depths(project: Project) -> tuple[float, float]:
+    """m, least and greatest depth of the lines in view, at the first, the middle and the last step of a motion.
+
+    Of a project without any: about where its first laser meets the camera's axis, else 1 m.
+    """
+    from studio.preview.preview import Preview
+
+    scene, preview = project.scene, Preview()
+    last = scene.motion.frame_count - 1
+    looks = [preview.look(project, project.folder, step) for step in sorted({0, last // 2, last})]
+    depth = np.concatenate([[], *(look.lit_curve(i).depth_z for look in looks for i in range(len(scene.lasers)))])
+    if len(depth):
+        return float(depth.min()), float(depth.max())
+    plane = scene.laser_plane(0) if scene.lasers else np.array([0.0, 0.0, 1.0, -1.0])
+    middle = -plane[3] / plane[2] if abs(plane[2]) > 1e-6 and -plane[3] / plane[2] > 0.0 else 1.0
+    return (1.0 - NOWHERE) * float(middle), (1.0 + NOWHERE) * float(middle)

@@ -95,20 +95,22 @@ def check_rows(result: Calibrated, views: int) -> list[tuple[str, str]]:
 
 def lens_sentence(terms: int, trials: Sequence[LensTrial]) -> str:
     """Which lens was chosen and why, and how every lens that was tried did at views that it was not fitted to."""
-    best = min(trials, key=lambda one: one.held_out)
-    tried = "; ".join(
-        f"{one.terms}: {one.held_out:.4g}"
-        + (f" and {1e6 * one.depth:.0f} um" if one.depth else "")
-        + (", chosen" if one.terms == terms else "")
-        + (", the best" if one is best else "")
-        + (f", p = {one.p:.1g}" if one is not trials[-1] else "")
-        for one in trials
-    )
+    tried = "; ".join(_trial_words(one, trials, terms) for one in trials)
+    depth = ", the depth error" if any(one.depth for one in trials) else ""
     return (
-        f"{terms} distortion terms, the fewest to which none with more is proved better (p under {PROOF:g}) by the "
-        f"corners of views that were held out; their mean squared residual{' and depth' if best.depth else ''}, and p "
-        f"that noise alone makes one with more terms seem as good as found: {tried}"
+        f"{terms} distortion terms: no lens with more is proved better on views that were left out of its fit. Each "
+        f"lens with the mean squared residual there{depth}, and the chance p that noise alone makes one with more "
+        f"terms seem as good (proved: under {PROOF:g}): {tried}"
     )
+
+
+def _trial_words(one: LensTrial, trials: Sequence[LensTrial], terms: int) -> str:
+    best = one is min(trials, key=lambda other: other.held_out)
+    marks = ", ".join(mark for mark, true in (("chosen", one.terms == terms), ("the least residual", best)) if true)
+    depth = f", {1e6 * one.depth:.0f} um" if one.depth else ""
+    # of the lens with most terms there is none with more
+    chance = f", p {one.p:.1g}" if one is not trials[-1] else ""
+    return f"{one.terms} terms {one.held_out:.4g}{depth}{chance}" + (f" ({marks})" if marks else "")
 
 
 def next_sentence(advice: Advice, target_um: float | None) -> str:

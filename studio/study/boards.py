@@ -20,6 +20,7 @@ from studio.project.validation_messages import input_error
 V = TypeVar("V")
 PREFIX = "boards."
 """Of the paths in a study that are of the boards, and not of the project."""
+RANGE = "None: about where the lines lie on the parts."
 
 
 class Boards(Model):
@@ -30,8 +31,8 @@ class Boards(Model):
     corner_sigma: float = quantity(0.05, unit="px", label="Sigma of the corners", ge=1e-4, le=10.0)
     line_sigma: float = quantity(0.05, unit="px", label="Sigma of the line on the board", ge=1e-4, le=10.0)
     most_tilt: float = quantity(math.pi / 4, unit="rad", label="Largest tilt of the board", ge=1e-4, le=1.4)
-    nearest: float | None = quantity(None, unit="m", label="Nearest board", ge=1e-3, le=1e4)
-    farthest: float | None = quantity(None, unit="m", label="Farthest board", ge=1e-3, le=1e4)
+    nearest: float | None = quantity(None, unit="m", label="Nearest board", help=RANGE, ge=1e-3, le=1e4)
+    farthest: float | None = quantity(None, unit="m", label="Farthest board", help=RANGE, ge=1e-3, le=1e4)
     lens: Literal[0, 4, 5, 8, 12, 14] | None = quantity(0, label="Terms of distortion", help="None: chosen.")
 
     @field_validator("board")

@@ -48,6 +48,8 @@ OF_A_FILE = {
 """What a person is asked for, and what is shown of the answer."""
 LENSES = (("By held-out views", None), *((f"{terms} distortion terms", terms) for terms in (0, 4, 5, 8, 12, 14)))
 CARRIED = (("Board put by hand", None), ("Carried by…", "camera"), ("Carried by a robot's hand…", "board"))
+OF_PROJECT = "Carried as the project moves"
+"""In place of the first, of virtual boards."""
 TABLES = "Tables (*.csv);;All files (*)"
 FILES = "Calibrations (*.json);;All files (*)"
 NARROWEST = 250
@@ -63,7 +65,9 @@ class CalibratePanel(QWidget):
         self.session, self.runner, self.work = session, runner, one_of(CalibrationWork, session)
         self.work.attach(runner)
         self.photographs = text_button("Photographs…", "A folder of photographs of a board; or drop it here")
-        self.simulate = text_button("In silico", "Virtual boards before the open project's camera, beside the truth")
+        self.simulate = text_button(
+            "In silico", "Virtual boards about where the lines lie on the parts, beside the truth"
+        )
         self.source = ElidedLabel(Qt.TextElideMode.ElideMiddle)
         self.source.setObjectName("muted")
         self.source.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
@@ -151,6 +155,8 @@ class CalibratePanel(QWidget):
             self.carried.setItemText(i, text if table is None or which != holds else f"{text[:-1]}: {table.name}")
         with QSignalBlocker(self.carried):
             self.carried.setCurrentIndex(next(i for i, (_, which) in enumerate(CARRIED) if which == holds))
+        moved = work.virtual and work.material is not None and work.material.told is not None
+        self.carried.setItemText(0, OF_PROJECT if moved else CARRIED[0][0])
         self.carried.setEnabled(not work.virtual)
         for i, (text, part) in enumerate(PARTS):
             named = work.camera_file if part == work.what and part in OF_A_FILE else None

@@ -142,6 +142,7 @@ class CalibrationWork(QObject):
         from studio.calibration.solving import in_window
 
         project, nearest, farthest = self.session.project, self.nearest, self.farthest
+        project = project.in_folder(self.session.document.root)
         board = self.board()
         if board is None:
             return

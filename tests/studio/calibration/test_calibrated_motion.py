@@ -29,7 +29,12 @@ def run(*words: str) -> tuple[int, dict]:
 def away(found: dict, truth: dict) -> float:
     """Squared error in sigmas; the covariance of an axis has two directions less than its six numbers."""
     names = {"stage": ("step",), "turntable": ("axis", "point"), "hand_eye": ("rotation", "translation")}[found["kind"]]
-    error = np.concatenate([np.subtract(found[name], truth[name]) for name in names])
+    exact = {name: np.array(truth[name]) for name in names}
+    if "rotation" in exact:  # half a turn about an axis is half a turn about its opposite
+        turn = exact["rotation"]
+        other = turn * (1.0 - 2.0 * np.pi / np.linalg.norm(turn))
+        exact["rotation"] = min(turn, other, key=lambda one: float(np.linalg.norm(found["rotation"] - one)))
+    error = np.concatenate([found[name] - exact[name] for name in names])
     return float(error @ np.linalg.pinv(np.array(found["covariance"]), rcond=1e-9, hermitian=True) @ error)
 
 

@@ -18,16 +18,16 @@ from studio.project.templates import template_folder
 def test_the_lens_is_told_with_why_it_was_chosen_and_which_was_the_best() -> None:
     trials = [LensTrial(0, 1.2, 43e-6, 2e-5), LensTrial(4, 1.1, 41e-6, 0.6), LensTrial(5, 1.09, 42e-6, 1.0)]
     assert lens_sentence(4, trials) == (
-        "4 distortion terms, the fewest to which none with more is proved better (p under 0.05) by the corners of "
-        "views that were held out; their mean squared residual and depth, and p that noise alone makes one with more "
-        "terms seem as good as found: 0: 1.2 and 43 um, p = 2e-05; 4: 1.1 and 41 um, chosen, p = 0.6; "
-        "5: 1.09 and 42 um, the best"
+        "4 distortion terms: no lens with more is proved better on views that were left out of its fit. Each lens with "
+        "the mean squared residual there, the depth error, and the chance p that noise alone makes one with more terms "
+        "seem as good (proved: under 0.05): 0 terms 1.2, 43 um, p 2e-05; 4 terms 1.1, 41 um, p 0.6 (chosen); "
+        "5 terms 1.09, 42 um (the least residual)"
     )
 
 
 def test_a_lens_without_terms_may_be_the_best_itself() -> None:
     trials = [LensTrial(0, 0.959, 42e-6, 0.7), LensTrial(4, 0.964, 41e-6, 0.4), LensTrial(5, 0.975, 42e-6, 1.0)]
-    assert "0: 0.959 and 42 um, chosen, the best, p = 0.7; 4: 0.964" in lens_sentence(0, trials)
+    assert "0 terms 0.959, 42 um, p 0.7 (chosen, the least residual); 4 terms 0.964" in lens_sentence(0, trials)
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_what_the_error_that_is_wanted_takes_is_told_with_the_next_pose(wanted_u
 
 def test_without_a_laser_no_depth_is_told() -> None:
     told = lens_sentence(0, [LensTrial(0, 0.98, 0.0, 1.0)])
-    assert told.endswith("0: 0.98, chosen, the best") and "depth" not in told and " um" not in told
+    assert told.endswith("0 terms 0.98 (chosen, the least residual)") and "depth" not in told and " um" not in told
 
 
 def test_a_board_that_no_place_shows_is_not_told_as_found() -> None:

@@ -43,7 +43,7 @@ def test_the_project_s_own_motion_is_found_and_used_in_it(qtbot: QtBot, desk: De
     settled(qtbot, desk)
     assert desk.work.solved is not None, desk.work.problem
     assert "stage: direction" in desk.found.text.toPlainText()
-    assert not desk.panel.carried.isEnabled()
+    assert not desk.panel.carried.isEnabled() and desk.panel.carried.currentText() == "Carried as the project moves"
     # every view has its residuals, those of the carried board as well
     rms = [row.rms for row, _ in desk.work.solved.rows]
     assert all(one is not None and one < 0.1 for one in rms)
