@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -137,15 +137,31 @@ def _over_holes(cloud: Cloud, mesh: Delaunay, edges: Float) -> NDArray[np.bool_]
     return np.asarray(np.any((of == np.roll(of, 1, axis=1)) & (edges > HOLE * np.median(apart)), axis=1))
 
 
-def encoded(heights: Float, limits: tuple[float, float] | None = None) -> tuple[NDArray[np.uint16], float, float]:
+def within(made: HeightMap, limits: tuple[float, float] | None) -> HeightMap:
+    """The map without heights beyond limits, m, as large as the others need; None, or where none is beyond: as it is.
+
+    InputError: none is within the limits.
+    """
+    known = np.isfinite(made.heights)
+    kept = known if limits is None else known & (made.heights >= limits[0]) & (made.heights <= limits[1])
+    if np.array_equal(kept, known):
+        return made
+    if not kept.any():
+        raise InputError("the height map has no cell with a height", cure="keep all heights")
+    rows, columns = (np.flatnonzero(kept.any(axis=axis)) for axis in (1, 0))
+    shown = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    heights = np.where(kept, made.heights, np.nan)[shown]
+    x, y = made.x + columns[0] * made.pitch, made.y - rows[0] * made.pitch
+    return replace(made, heights=heights, x=float(x), y=float(y))
+
+
+def encoded(heights: Float) -> tuple[NDArray[np.uint16], float, float]:
     """16-bit numbers, scale and offset: a height is offset + scale times its number, and 0 says that there is none.
 
-    limits: m, heights beyond which are left out, so that few of them do not take the levels from the others; None: all
-    are kept. The scale has three digits. InputError: there is no height at all, or none within the limits.
+    The scale has three digits; a few heights far from all others make it coarser (`within`). InputError: there is no
+    height at all.
     """
     known = np.isfinite(heights)
-    if limits is not None:
-        known &= (heights >= limits[0]) & (heights <= limits[1])
     if not known.any():
         raise InputError("the height map has no cell with a height", cure="give a larger pitch")
     low, high = float(heights[known].min()), float(heights[known].max())

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.cloud import Cloud, merge, ply_pieces
 from analysis.deviation import far_off
-from analysis.height_map import HeightMap, encoded, height_map
+from analysis.height_map import HeightMap, encoded, height_map, within
 from analysis.report.units import digits
-from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import atomic_write
 from render.base.finite import known
@@ -100,7 +98,7 @@ def picture(made: HeightMap, scale: ColourScale, limits: tuple[float, float]) ->
 
 
 def write_made(made: HeightMap, path: Path, points: Path, limits: tuple[float, float] | None = None) -> Written:
-    """.png or .tif, by the suffix, and .json beside it; points: which it is of; limits: as of `encoded`.
+    """.png or .tif, by the suffix, and .json beside it; points: which it is of; limits: as of `within`.
 
     InputError: the suffix is another, no cell has a height, or a file would replace one of other origin.
     """
@@ -119,11 +117,12 @@ def _check_suffix(path: Path) -> None:
 
 
 def _written(
-    made: HeightMap, path: Path, beside: Path, source: Path, limits: tuple[float, float] | None = None
+    whole: HeightMap, path: Path, beside: Path, source: Path, limits: tuple[float, float] | None = None
 ) -> Written:
     import cv2
 
-    numbers, scale, offset = encoded(made.heights, limits)
+    made = within(whole, limits)
+    numbers, scale, offset = encoded(made.heights)
     done, data = cv2.imencode(path.suffix.lower(), numbers)
     if not done:
         raise InputError("the height map cannot be encoded", where=str(path))
@@ -143,7 +142,7 @@ def _written(
         "x_first": made.x,
         "y_first": made.y,
         "valid": int(np.count_nonzero(numbers)),
-        "left_out": _left_out(made.heights, numbers > 0),
+        "left_out": left_out_record(whole, made),
         "steep": steep_record(made),
         "points": made.points,
         "sigma": sigma_record(made, scale),
@@ -155,20 +154,20 @@ def _written(
     return Written([path, beside], record)
 
 
-def _left_out(heights: Float, kept: NDArray[np.bool_]) -> dict[str, Any]:
-    """How many cells with a height the picture lacks, and from where to where heights are without and with them; m."""
-    there = np.isfinite(heights)
+def left_out_record(whole: HeightMap, kept: HeightMap) -> dict[str, Any]:
+    """How many cells with a height the kept map lacks, and from where to where heights are without and with them; m."""
+    inside, there = (one.heights[np.isfinite(one.heights)] for one in (kept, whole))
     return {
-        "cells": int(np.count_nonzero(there & ~kept)),
-        "kept_from": float(heights[kept].min()),
-        "kept_to": float(heights[kept].max()),
-        "all_from": float(heights[there].min()),
-        "all_to": float(heights[there].max()),
+        "cells": len(there) - len(inside),
+        "kept_from": float(inside.min()),
+        "kept_to": float(inside.max()),
+        "all_from": float(there.min()),
+        "all_to": float(there.max()),
     }
 
 
 def left_out_sentence(left_out: dict[str, Any]) -> str:
-    """What `_left_out` says, for a person; empty where all heights are in the picture."""
+    """What `left_out_record` says, for a person; empty where all heights are in the picture."""
     if not left_out["cells"]:
         return ""
     kept, all_of = ([f"{1e3 * left_out[f'{name}_{end}']:.4g}" for end in ("from", "to")] for name in ("kept", "all"))
@@ -196,11 +195,9 @@ def steep_sentence(steep: dict[str, Any]) -> str:
     )
 
 
-def shown_range(made: HeightMap, limits: tuple[float, float] | None) -> tuple[float, float] | None:
-    """m, from the lowest to the highest cell within limits, as of `encoded`; None: there are no two heights."""
+def shown_range(made: HeightMap) -> tuple[float, float] | None:
+    """m, from the lowest to the highest cell; None: there are no two heights."""
     heights = made.heights[np.isfinite(made.heights)]
-    if limits is not None:
-        heights = heights[(heights >= limits[0]) & (heights <= limits[1])]
     low, high = (float(heights.min()), float(heights.max())) if len(heights) else (0.0, 0.0)
     return (low, high) if high > low else None
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from analysis.gauges.read import Reading
 from analysis.report.colour import method_name
 from analysis.report.gauge_table import scale_and_unit, small_text, value_text
 from analysis.report.units import digits
@@ -21,8 +22,13 @@ from studio.study.changes import Change, changes
 
 NONE = "-"
 PIXELS = "px"
+LABELS = {"Off the surface, RMSE": "Off the surface with false scan lines, RMSE"}
+"""Of figures whose names in files do not say what they hold."""
 DEVELOPING = ("sensor", "extraction", "scene.rig.camera.lens")
 """Fields that decide figures of the same light, beside the lasers' powers."""
+MILLIMETRE = 1e-3
+SURE = 5.0
+"""Sigmas beyond which two readings differ."""
 KEPT_AS_READ = "Keep with the project keeps a render as it is read now."
 
 
@@ -36,6 +42,8 @@ class Row:
     """A figure, not a setting."""
     values: tuple[float, ...] = ()
     """Of a figure, all its digits, in the unit of the label."""
+    notes: tuple[str, ...] = ()
+    """Of a measure, for each render: why it has no value, or what a person must know before comparing it."""
 
 
 def side_by_side(renders: Sequence[Kept], now: Project | None = None) -> list[Row]:
@@ -58,7 +66,7 @@ def side_by_side(renders: Sequence[Kept], now: Project | None = None) -> list[Ro
         apart = unit == PIXELS and not one_scale  # pixels of another size have no difference
         alike = [one.image_scale == first.image_scale or not apart for one in renders]
         cells = [_cell(value, values[0] if k and alike[k] else math.nan) for k, value in enumerate(values)]
-        label = f"{name} / {unit}" + (" of its own image" if apart else "")
+        label = f"{LABELS.get(name, name)} / {unit}" + (" of its own image" if apart else "")
         rows.append(Row(label, tuple(cells), True, tuple(values)))
     rows += _measures(renders)
     developed = _developed_rows(renders, now)
@@ -161,12 +169,31 @@ def _measures(renders: Sequence[Kept]) -> list[Row]:
         cells = [value_text(one.value, one.sigma, unit) if one is not None else NONE for one in read]
         for k, value in enumerate(values[1:], 1):
             if math.isfinite(value - values[0]):
-                sign = "+" if value > values[0] else ""
-                cells[k] += f" ({sign}{small_text(value - values[0], unit)})"
+                cells[k] += f" ({_difference(value - values[0], unit)})"
         scale, shown = scale_and_unit(unit)
         told = tuple(scale * value for value in values)
-        rows.append(Row(f"{name} / {shown.strip()}", tuple(cells), True, told))
+        notes = tuple(_note(one, read[0], renders[0].name) for one in read)
+        rows.append(Row(f"{name} / {shown.strip()}", tuple(cells), True, told, notes))
     return rows
+
+
+def _difference(value: float, unit: str) -> str:
+    """In um up to a millimetre, beyond it in the unit of the values."""
+    text = value_text(value, None, unit) if unit == "m" and abs(value) >= MILLIMETRE else small_text(value, unit)
+    return f"{'+' if value > 0.0 else ''}{text}"
+
+
+def _note(one: Reading | None, first: Reading | None, name: str) -> str:
+    """What is told of a reading beside the first render's; where most of a difference is the part's own, so."""
+    if one is None:
+        return ""
+    told = [text for text in (one.reason, one.remark) if text]
+    if first is not None and one is not first:
+        apart, own = one.value - first.value, one.truth - first.truth
+        if abs(own) > 0.5 * abs(apart) and not abs(apart) <= SURE * math.hypot(one.sigma, first.sigma):
+            exact = value_text(one.truth, None, one.gauge.unit), value_text(first.truth, None, one.gauge.unit)
+            told.append(f"exact here {exact[0]}, in {name} {exact[1]}: these regions lie on another place of the part")
+    return "; ".join(told)
 
 
 def write_table(path: Path, renders: Sequence[Kept], rows: Sequence[Row]) -> None:

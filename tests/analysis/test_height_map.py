@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
 from analysis.cloud import Cloud
-from analysis.height_map import HeightMap, decoded, encoded, height_map
+from analysis.height_map import HeightMap, decoded, encoded, height_map, within
 from render.base.errors import InputError
 
 ROWS, STEPS, SIGMA = 40, 12, 2e-5
@@ -109,6 +111,26 @@ def test_what_makes_no_height_map_is_refused(kept: slice, pitch: float | None, w
     cloud = {name: column[kept] for name, column in scan().items()}
     with pytest.raises(InputError, match=words):
         height_map(cloud, pitch)
+
+
+def test_strays_that_are_left_out_leave_the_others_where_they_were_on_a_grid_of_their_own() -> None:
+    """Four stray cells doubled the grid: under half of its cells had a height, and heights began at -858 mm."""
+    whole = height_map(scan())
+    heights = np.full(tuple(2 * side for side in whole.heights.shape), np.nan)
+    heights[-whole.heights.shape[0] :, : whole.heights.shape[1]] = whole.heights
+    top = whole.y + whole.heights.shape[0] * whole.pitch
+    heights[:2, -2:] = -0.8
+    wide = replace(whole, heights=heights, y=top)
+    kept = within(wide, (-0.1, 1.0))
+    known = np.isfinite(whole.heights)
+    rows, columns = (np.flatnonzero(known.any(axis=axis)) for axis in (1, 0))
+    inner = whole.heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    np.testing.assert_array_equal(kept.heights, inner)
+    assert kept.x == pytest.approx(whole.x + columns[0] * whole.pitch, abs=1e-12)
+    assert kept.y == pytest.approx(whole.y - rows[0] * whole.pitch, abs=1e-12)
+    assert within(wide, None) is wide and within(wide, (-1.0, 1.0)) is wide
+    with pytest.raises(InputError, match="no cell with a height"):
+        within(wide, (5.0, 6.0))
 
 
 def test_a_stray_point_does_not_widen_the_map() -> None:

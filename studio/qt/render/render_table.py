@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 
 from PySide6.QtCore import QMargins, QSize, Qt
@@ -23,6 +24,7 @@ from render.world.world import build_world
 from studio.project.date_and_time import read_out
 from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.figures_age import FiguresAge
+from studio.qt.core.icons import icon
 from studio.qt.core.session import Render, Session, one_of
 from studio.qt.core.widgets import room_for_a_window, text_button
 from studio.runtime.error_messages import trouble
@@ -35,6 +37,8 @@ MEASURING = "The shown render is being measured with the settings of now; its fi
 HINT = (
     "Figures are followed by their difference from the first column's. Other settings that all have alike are left out."
 )
+MOST_NOTES = 4
+"""Of measures, below the table."""
 FEWEST_PX, WIDEST_PX = 230, 1280
 
 
@@ -160,7 +164,17 @@ class RenderTable(QDialog):
     def _tell(self) -> None:
         measuring = [MEASURING] if self.age.old else []
         self.developed.setText(developed_as(self.renders, self.session.project) if self.renders else "")
-        self.told.setText("\n".join([*scale_warnings(self.renders), *measuring, HINT, *self.wrong]))
+        notes = [
+            f"{one.name}, {row.label.rpartition(' / ')[0]}: {note}"
+            for row in self.rows
+            for one, note in zip(self.renders, row.notes, strict=False)
+            if note
+        ]
+        more = [f"{len(notes) - MOST_NOTES} more are told where the mouse rests on their cells"] * (
+            len(notes) > MOST_NOTES
+        )
+        told = [*scale_warnings(self.renders), *notes[:MOST_NOTES], *more, *measuring, HINT, *self.wrong]
+        self.told.setText("\n".join(told))
 
     def chosen(self) -> Kept | None:
         """The kept render of the column that is chosen."""
@@ -199,7 +213,10 @@ class RenderTable(QDialog):
                 item = QTableWidgetItem(text)
                 item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
                 table.setItem(i, k, item)
-                item.setToolTip(text)
+                note = row.notes[k] if row.notes else ""
+                item.setToolTip(f"<p>{escape(text)}</p><p>{escape(note)}</p>" if note else text)
+                if note:
+                    item.setIcon(icon("warning"))
                 if row.measured:
                     item.setFont(bold)
         table.horizontalHeader().setMinimumSectionSize(FEWEST_PX)

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from analysis.height_map import HeightMap, along, encoded, height_map
+from analysis.height_map import HeightMap, along, encoded, height_map, within
 from analysis.report.colour import method_colour
 from render.base.arrays import Float
 from render.base.errors import InputError
@@ -41,6 +41,7 @@ from studio.runtime.jobs import Job
 from studio.scan.colour_scale import PER_METRE, ColourScale
 from studio.scan.height_map import (
     file_range,
+    left_out_record,
     left_out_sentence,
     picture,
     points_of,
@@ -69,10 +70,13 @@ LEAST_PX, TOLD_PX = 300, 240
 class HeightMapTab(QWidget):
     """Made when it is looked at, for as long as the same scan is shown."""
 
+    made: HeightMap | None = None
+    """As it is shown and written: the whole one, or without strays."""
+
     def __init__(self, session: Session, runner: JobRunner) -> None:
         super().__init__()
         self.session, self.runner = session, runner
-        self.made: HeightMap | None = None
+        self.whole = self.made
         self._line = ""
         """What is told of the profile."""
         self._scan: ScanResults | None = None
@@ -87,7 +91,9 @@ class HeightMapTab(QWidget):
         self._file_range: tuple[float, float] | None = None
         """m, what a file has of the heights."""
         self.all_heights = QCheckBox("All heights")
-        self.all_heights.setToolTip("Into the file also those of stray points, which make its levels coarser")
+        self.all_heights.setToolTip(
+            "Those of stray points too, in picture and file: they make the levels of the file coarser"
+        )
         self.export = text_button(
             "Export…", "16 bit, with scale, offset and the value of no height in a file beside it"
         )
@@ -121,7 +127,7 @@ class HeightMapTab(QWidget):
         self.pitch.refused.connect(partial(session.message.emit, "warning"))
         self.pitch.valueChanged.connect(lambda _: self._rest.start())
         self.export.clicked.connect(self._ask)
-        self.all_heights.toggled.connect(self._tell)
+        self.all_heights.toggled.connect(lambda: self._take(self.whole))
         self.bar.scaled.connect(self._rescale)
         self.bar.unit_chosen.connect(self._draw)
         self.line.sigRegionChanged.connect(self._show_profile)
@@ -167,16 +173,15 @@ class HeightMapTab(QWidget):
         def then(made: tuple[HeightMap, Range]) -> None:
             if scan is self._scan:
                 self._file_range = made[1]
-                self._first = shown_range(*made)
                 self._take(made[0])
 
         self.runner.run(LANE, "height map", work, then)
 
     def write(self, path: Path) -> None:
         """InputError: there is no map, or as of `write_made`."""
-        if self.made is None or self._scan is None:
+        if self.whole is None or self._scan is None:
             raise InputError("there is no height map yet")
-        written = write_made(self.made, path, points_of(self._scan.found.folder), self._limits())
+        written = write_made(self.whole, path, points_of(self._scan.found.folder), self._limits())
         left_out = left_out_sentence(written.record["left_out"])
         text = f"Wrote {', '.join(str(file) for file in written.paths)}"
         self.session.message.emit("warning" if left_out else "info", f"{text}. {left_out}" if left_out else text)
@@ -185,8 +190,15 @@ class HeightMapTab(QWidget):
         """Of the heights that a file has; None: all."""
         return None if self.all_heights.isChecked() else self._file_range
 
-    def _take(self, made: HeightMap | None) -> None:
-        before, self.made = self.made, made
+    def _take(self, whole: HeightMap | None) -> None:
+        before, self.whole = self.made, whole
+        try:
+            kept = None if whole is None else within(whole, self._file_range)
+        except InputError:  # nothing else there
+            kept = whole
+        made = self.made = whole if self.all_heights.isChecked() else kept
+        # colours are those of the part, also where strays are shown
+        self._first = None if kept is None else shown_range(kept)
         self.split.setVisible(made is not None)
         self.read.setVisible(made is not None)
         self.export.setEnabled(made is not None)
@@ -204,8 +216,8 @@ class HeightMapTab(QWidget):
         self._show_profile()
 
     def _tell(self) -> None:
-        made = self.made
-        if made is None:
+        made, whole = self.made, self.whole
+        if made is None or whole is None:
             return
         rows, columns = made.heights.shape
         size = f"{columns} x {rows} cells of {1e3 * made.pitch:.4g} mm of {made.points} points, "
@@ -214,10 +226,9 @@ class HeightMapTab(QWidget):
         if np.isfinite(made.heights).any():
             low, high = 1e3 * np.nanmin(made.heights), 1e3 * np.nanmax(made.heights)
             texts.append(f"Heights from {low:.4g} to {high:.4g} mm")
+            texts.append(left_out_sentence(left_out_record(whole, made)))
             texts.append(steep_sentence(steep_record(made)))
-            texts.append(
-                sigma_sentence(sigma_record(made, encoded(made.heights, self._limits())[1])).replace(" um", " µm")
-            )
+            texts.append(sigma_sentence(sigma_record(made, encoded(made.heights)[1])).replace(" um", " µm"))
         self.told.setText("\n".join(filter(None, texts)))
 
     def _draw(self) -> None:

@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from analysis.height_map import HeightMap
+from analysis.height_map import HeightMap, within
 from studio.scan.colour_scale import ColourScale
 from studio.scan.deviation import Compared, Question
 from studio.scan.first_range import deviation_limit, profile_range
@@ -38,10 +38,11 @@ def test_heights_are_those_of_the_part() -> None:
     heights = np.concatenate([np.linspace(0.0, 0.031, 900), np.full(100, -0.0695)])
     errors = np.concatenate([RANDOM.normal(0.0, 1e-5, 900), np.full(50, 0.07), np.full(50, np.nan)])
     made = HeightMap(heights[None], 0.0, 0.0, 1e-3, len(heights), 1e-5, 1e-5, 0.0)
-    assert shown_range(made, file_range({"z": heights, "error_depth": errors})) == (0.0, 0.031)
-    assert shown_range(made, None) == (-0.0695, 0.031)
+    kept = within(made, file_range({"z": heights, "error_depth": errors}))
+    assert shown_range(kept) == (0.0, 0.031) and kept.heights.shape == (1, 900)
+    assert shown_range(made) == (-0.0695, 0.031)
     level = HeightMap(np.zeros((1, 4)), 0.0, 0.0, 1e-3, 4, 1e-5, 1e-5, 0.0)
-    assert shown_range(level, None) is None
+    assert shown_range(level) is None
 
 
 def test_a_profile_is_as_large_as_the_true_one() -> None:

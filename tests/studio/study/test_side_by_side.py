@@ -81,6 +81,22 @@ def test_measures_of_the_part_are_read_of_every_render() -> None:
     assert row.label == "rise / mm" and row.cells == ("21.1664\u00a0mm", "21.1714\u00a0mm (+5.00\u00a0µm)")
 
 
+def test_a_difference_that_is_the_parts_own_says_so_and_has_the_unit_of_its_values() -> None:
+    """A step of 78 mm less was told as -78235 um, without a word on regions that lay beside it."""
+    gauge = Gauge(name="rise", kind="step", regions=((-0.1, 0.0), (0.0, 0.1)))
+    project = Project.load("plane").model_copy(update={"measures": (gauge,)})
+
+    def of(name: str, value: float, truth: float, **more: str) -> Kept:
+        reading = Reading(gauge, 0, value, sigma_random=4e-6, truth=truth, **more)
+        return Kept(name, "", project, 1.0, {}, readings=(reading,))
+
+    nothing = of("d", math.nan, math.nan, reason="no points in its first region")
+    (row,) = side_by_side([of("a", 0.0791, 0.0791), of("b", 0.000865, 0.00086), of("c", 0.07915, 0.0791), nothing])
+    assert row.cells[1].endswith("(-78.2350\u00a0mm)") and row.cells[2].endswith("(+50.0\u00a0µm)")
+    told = "exact here 0.8600\u00a0mm, in a 79.1000\u00a0mm: these regions lie on another place of the part"
+    assert row.notes == ("", told, "", "no points in its first region")
+
+
 def test_a_smaller_render_has_the_exposure_of_the_scanner_and_what_is_unfinished_says_so(tmp_path: Path) -> None:
     one, *_ = renders()
     short = one.project.replaced({"sensor.exposure_time": 0.001})

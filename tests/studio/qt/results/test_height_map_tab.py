@@ -13,7 +13,7 @@ import pytest
 from PySide6.QtCore import QPointF
 from pytestqt.qtbot import QtBot
 
-from analysis.height_map import along, height_map
+from analysis.height_map import along, height_map, within
 from render.scene.motion import LinearStage
 from studio.project.document import Document, replaced
 from studio.qt.core.jobs import JobRunner
@@ -68,15 +68,16 @@ def test_it_is_the_map_of_the_scans_points(tab: HeightMapTab, scanned: tuple[Pat
     made = tab.made
     assert made is not None
     points = read_cloud(scanned[1] / "points.ply")
-    expected = height_map(points)
+    limits = file_range(points)
+    expected = within(height_map(points), limits)
     np.testing.assert_array_equal(made.heights, expected.heights)
     rows, columns = made.heights.shape
     assert tab.view.item.size == (columns, rows) and f"{columns} x {rows} cells" in tab.told.text()
     assert f"{made.sigma_cells / made.sigma_points:.2f} of a point's" in tab.told.text()
     low, high = tab.bar.limits
     # the colours go as far as the file does: a legend beyond that told of heights which there are not
-    ends = file_range(read_points(scanned[1] / "points.ply"))
-    kept = made.heights[(made.heights >= ends[0]) & (made.heights <= ends[1])]
+    kept = made.heights[np.isfinite(made.heights)]
+    assert limits[0] <= kept.min() and kept.max() <= limits[1]
     assert (low, high) == pytest.approx((1e3 * kept.min(), 1e3 * kept.max()))
     assert f"from {1e3 * np.nanmin(made.heights):.4g} to {1e3 * np.nanmax(made.heights):.4g} mm" in tab.told.text()
     assert (steep_sentence(steep_record(made)) in tab.told.text()) and bool(made.steep) == ("walls" in tab.told.text())
@@ -142,11 +143,14 @@ def test_what_it_writes_reads_back_as_what_it_shows(
     heights = np.where(numbers > 0, beside["offset"] + beside["scale"] * numbers.astype(float), np.nan)
     limits = file_range(read_points(scanned[1] / "points.ply"))
     assert limits is not None
-    within = np.where((made.heights >= limits[0]) & (made.heights <= limits[1]), made.heights, np.nan)
-    np.testing.assert_allclose(heights, within, atol=0.5001 * beside["scale"], rtol=0.0)
-    left_out = np.count_nonzero(np.isfinite(made.heights)) - np.count_nonzero(np.isfinite(within))
-    assert beside["left_out"]["cells"] == left_out
+    np.testing.assert_allclose(heights, made.heights, atol=0.5001 * beside["scale"], rtol=0.0)
+    whole = tab.whole
+    assert whole is not None
+    beyond = (whole.heights < limits[0]) | (whole.heights > limits[1])
+    assert beside["left_out"]["cells"] == np.count_nonzero(beyond)
     tab.all_heights.click()
+    made = tab.made
+    assert made is whole
     tab.write(file)
     beside = json.loads(file.with_suffix(".json").read_text())
     numbers = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
@@ -162,12 +166,13 @@ def test_what_a_file_leaves_out_is_told(tab: HeightMapTab, tmp_path: Path) -> No
     told: list[tuple[str, str]] = []
     tab.session.message.connect(lambda kind, text: told.append((kind, text)))
     heights = np.clip(made.heights, *tab._file_range)
-    tab.made = replace(made, heights=heights)
+    tab._take(replace(made, heights=heights))
     tab.write(tmp_path / "clean.png")
     row, column = (int(one[0]) for one in np.nonzero(np.isfinite(heights)))
     heights = heights.copy()
     heights[row, column] = -0.6
-    tab.made = replace(made, heights=heights)
+    tab._take(replace(made, heights=heights))
+    assert "1 cell is left out" in tab.told.text() and "heights go from -600 to" in tab.told.text()
     tab.write(tmp_path / "stray.png")
     clean, stray = (json.loads((tmp_path / f"{name}.json").read_text()) for name in ("clean", "stray"))
     assert stray["scale"] == pytest.approx(clean["scale"], rel=0.01) and stray["valid"] == clean["valid"] - 1
