@@ -57,6 +57,18 @@ def fitted(item: SceneObject, vertices: Float, scene: Scene) -> SceneObject:
     return _moved(item.model_copy(update={"scale": scale}), target(scene) - middle)
 
 
+def on_its_foot(item: SceneObject, vertices: Float, factor: float) -> SceneObject:
+    """Of an item that has become `factor` times as large, the lowest and the middle of what it was stay in their place.
+
+    vertices: as of `with_axis_up`, as they were.
+    """
+    matrix = item.T_world_object.matrix
+    around = vertices @ matrix[:3, :3].T
+    low, high = around.min(axis=0), around.max(axis=0)
+    foot = np.array([*(0.5 * (low + high))[:2], low[2]])
+    return _moved(item, matrix[:3, 3] + (1.0 - factor) * foot)
+
+
 def meeting(boxes: Sequence[tuple[Float, Float]], index: int) -> list[int]:
     """Which boxes share space with one of them. boxes: (2, 3) m lowest and highest corner, and (4, 4) to the world.
 

@@ -15,6 +15,7 @@ from studio.editing.forms import Alternative, FieldSpec, describe_item, edited, 
 from studio.editing.scene_edits import new_motion
 from studio.editing.targets import other_frame
 from studio.project.document import FieldPath, value_at
+from studio.project.project import Project
 from studio.project.project_files import in_project
 from studio.qt.core import theme
 from studio.qt.core.session import Session
@@ -31,6 +32,8 @@ MAX_ITEMS = 12
 """Of a list, shown."""
 ChooseFile = Callable[[FieldPath, Alternative | None], object]
 """(path of a shape, texture or material, the kind it is to have or None for its own): let a person choose a file."""
+Adjust = Callable[[FieldPath, Project, Project], Project]
+"""(path of the owner of a field, the project before and after its edit) -> with what else has to follow."""
 
 
 class Fold(QAbstractButton):
@@ -111,6 +114,7 @@ class Form(QWidget):
     def __init__(self, session: Session, choose: ChooseFile) -> None:
         super().__init__()
         self.session, self.choose_file = session, choose
+        self.adjust: Adjust = lambda owner, before, after: after
         self.rows: dict[FieldPath, list[Row]] = {}
         """By where the value stands; a pose has two."""
         self.kinds: dict[FieldPath, ChoiceField] = {}
@@ -166,7 +170,7 @@ class Form(QWidget):
         document = self.session.document
         value = in_project(value, document.root) if spec.kind == "file" else value
         try:
-            project = edited(document.project, owner, spec, value)
+            project = self.adjust(owner, document.project, edited(document.project, owner, spec, value))
         except InputError as error:
             return reason(error)
         before = document.project

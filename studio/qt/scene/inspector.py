@@ -70,6 +70,7 @@ class Inspector(QWidget):
         self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.mesh_bar = MeshBar(session)
         self.form = Form(session, self._choose_file)
+        self.form.adjust = self.mesh_bar.after_edit
         content = QWidget()
         column = QVBoxLayout(content)
         column.setContentsMargins(10, 8, 8, 8)

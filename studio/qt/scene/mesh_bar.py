@@ -6,18 +6,20 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QGridLayout, QLabel, QMenu, QSizePolicy, QVBoxLayout, QWidget
 
 from render.base.arrays import Float
 from render.base.errors import InputError
 from render.scene.scene import SceneObject
-from render.scene.shape import MeshFile
+from render.scene.shape import UNITS, MeshFile
 from studio.editing import mesh_placing
 from studio.editing.scene_edits import OBJECTS, replace_mesh_of
 from studio.editing.units import Unit
 from studio.project.document import FieldPath, replaced, value_at
 from studio.project.mesh_import import ImportedMesh
+from studio.project.project import Project
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import text_button
@@ -25,6 +27,10 @@ from studio.qt.scene import mesh_importer
 
 REPLACES = "Another mesh file in its place, shaded as an import of it is; pose, scale and material stay"
 SCALES = "Changes its size: it is scaled until it fills the camera's view, and put in the middle of that"
+
+
+LINES = 3
+"""For which there is room below the buttons."""
 
 
 class MeshBar(QWidget):
@@ -39,6 +45,9 @@ class MeshBar(QWidget):
         self.ground = text_button("On the ground", "Its lowest point at height zero")
         self.told = QLabel(wordWrap=True)
         self.told.setObjectName("muted")
+        # the fields below stay where they are while its words change
+        self.told.setMinimumHeight(LINES * self.told.fontMetrics().lineSpacing())
+        self.told.setAlignment(Qt.AlignmentFlag.AlignTop)
         menu, group = QMenu(self.up), QActionGroup(self)
         self.axes = {}
         for axis in mesh_placing.UP_AXES:
@@ -122,17 +131,37 @@ class MeshBar(QWidget):
         """Names of what it may stand in."""
         look = live(self.session).look
         visible = [look.scene.visible_objects[one.index] for one in look.placed]
-        index = next(i for i, one in enumerate(visible) if one is item)
+        index = next(i for i, one in enumerate(visible) if _size(one) == _size(item))
         boxes = [(one.body.bounds, one.T_world_object) for one in look.placed]
         names = [visible[k].name for k in mesh_placing.meeting(boxes, index)]
         return ", ".join(names[:2]) + (f" and {len(names) - 2} more" if len(names) > 2 else "")
 
+    def after_edit(self, owner: FieldPath, before: Project, after: Project) -> Project:
+        """In another unit a part stands where it stood: about an origin elsewhere it would vanish below its table."""
+        path = owner[:3]
+        if path[:2] != OBJECTS or len(path) < 3:
+            return after
+        was, now = value_at(before, path), value_at(after, path)
+        if (
+            not (isinstance(was.shape, MeshFile) and isinstance(now.shape, MeshFile))
+            or was.shape.unit == now.shape.unit
+        ):
+            return after
+        vertices = self._vertices(was)
+        factor = UNITS[now.shape.unit] / UNITS[was.shape.unit]
+        return after if vertices is None else replaced(after, path, mesh_placing.on_its_foot(now, vertices, factor))
+
     def _vertices(self, item: SceneObject) -> Float | None:
-        """(n, 3) m in the object's frame, as they are drawn; None: they are not, or not as the item is now."""
+        """(n, 3) m in the object's frame, as drawn, wherever that is; None: they are not, or of another size."""
         look = live(self.session).look
-        found = (one for one in look.placed if look.scene.visible_objects[one.index] is item)
+        found = (one for one in look.placed if _size(look.scene.visible_objects[one.index]) == _size(item))
         placed = next(found, None)
         return None if placed is None else placed.body.surface.vertices
+
+
+def _size(item: SceneObject) -> tuple[object, ...]:
+    """All that its vertices hang on, and whose they are."""
+    return item.name, item.shape, item.scale
 
 
 def selected_mesh(session: Session) -> SceneObject | None:

@@ -16,6 +16,7 @@ from studio.editing.mesh_placing import (
     fitted,
     meeting,
     on_ground,
+    on_its_foot,
     up_axis,
     with_axis_up,
 )
@@ -44,6 +45,15 @@ def test_on_the_ground_the_lowest_vertex_is_at_zero_and_nothing_else_changes(ver
     assert abs(places[:, 2].min()) < NANOMETRE
     assert places[:, :2] == pytest.approx(in_world(ITEM, vertices)[:, :2], abs=NANOMETRE)
     assert down.model_copy(update={"T_world_object": POSE}) == ITEM
+
+
+def test_what_becomes_larger_or_smaller_stays_on_its_foot(vertices: Float) -> None:
+    before = in_world(ITEM, vertices)
+    for factor in (25.4, 0.001):
+        places = in_world(on_its_foot(ITEM, vertices, factor), factor * vertices)
+        assert places[:, 2].min() == pytest.approx(before[:, 2].min(), abs=NANOMETRE)
+        middles = [0.5 * (one[:, :2].min(axis=0) + one[:, :2].max(axis=0)) for one in (before, places)]
+        assert middles[0] == pytest.approx(middles[1], abs=NANOMETRE)
 
 
 @pytest.mark.parametrize("axis", UP_AXES)

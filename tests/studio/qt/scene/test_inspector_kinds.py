@@ -126,6 +126,15 @@ class TestKinds:
         placed = session.project.scene.objects[1]
         assert placed.T_world_object.translation[2] == pytest.approx(0.05, abs=1e-9)
         qtbot.waitUntil(lambda: "May stand in" not in bar.told.text())
+        # of another unit it stands where it stood, and one undo takes unit and place back
+        unit = field(inspector, "scene", "objects", 1, "shape", "unit")
+        unit.setCurrentIndex(unit.findText("in"))
+        unit.activated.emit(unit.currentIndex())
+        larger = session.project.scene.objects[1]
+        assert larger.shape.unit == "in" and larger.T_world_object.translation[2] == pytest.approx(25.4 * 0.05)
+        session.document.undo()
+        assert session.project.scene.objects[1] == placed
+        qtbot.waitUntil(lambda: bar.ground.isEnabled())
         trimesh.creation.icosphere(1, 10.0).export(outside.with_name("ball.stl"))
         monkeypatch.setattr(mesh_importer, "choose_file", lambda *_: outside.with_name("ball.stl"))
         qtbot.mouseClick(bar.replace, Qt.MouseButton.LeftButton)
