@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -10,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.cloud import Cloud, at_first_step, cloud, write_csv
+from analysis.cloud import Cloud, at_first_step, cloud, merge, write_csv
 from analysis.measures import FEWEST, error_statistics, median_length
 from render.base.arrays import Float
 from render.base.errors import InputError
@@ -146,16 +147,24 @@ def _with_sigma(value: float, sigma: float) -> str:
     return f"{value:.{places}f} ± {sigma:.{places}f}"
 
 
-def export_region(path: Path, region: Region | Box, found: Measurement, scene: Scene, root: Path) -> int:
-    """The region's points as points.csv has them; gives how many. InputError: none, or the file cannot be written."""
-    here = region.of(found, scene)
-    if not here.any():
+def export_region(path: Path, region: Region | Box, found: Mapping[str, Measurement], scene: Scene, root: Path) -> int:
+    """The region's points as points.csv has them; of several methods with the name of each in a column before them.
+
+    Gives how many. InputError: none, or the file cannot be written.
+    """
+    parts = []
+    for method, one in found.items():
+        kept = region.of(one, scene)[one.points.valid]
+        columns = cloud(one.points, one.errors, one.laser, one.step, scene)
+        named = {"method": np.full(np.count_nonzero(kept), method)} if len(found) > 1 else {}
+        parts.append(named | {name: column[kept] for name, column in columns.items()})
+    points = merge(parts)
+    count = len(points["row"])
+    if not count:
         raise InputError("no point is within the region", where=region.title, cure="drag a wider one")
     check_not_read([path], input_files(scene, root).values())
-    columns = cloud(found.points, found.errors, found.laser, found.step, scene)
-    kept = here[found.points.valid]
-    write_csv(path, {name: column[kept] for name, column in columns.items()})
-    return int(kept.sum())
+    write_csv(path, points)
+    return count
 
 
 def export_box(path: Path, region: Box, points: Cloud, laser: int, scanned: Path) -> int:

@@ -195,10 +195,7 @@ class CalibratePanel(QWidget):
         return Path(chosen) if chosen else None
 
     def _place(self) -> str:
-        work, path = self.work, self.session.document.path
-        if work.shots:
-            return work.source
-        return str(path.parent if path is not None else Path.home())
+        return self.work.source if self.work.shots else str(self.session.place)
 
     def _choose_what(self, index: int) -> None:
         part = self.what.itemData(index)

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from render.base.errors import InputError
-from studio.project.document import Document
+from studio.qt.core.session import Session
 from studio.runtime.error_messages import Trouble, trouble
 
 Answer = Literal["save", "discard", "cancel"]
@@ -142,21 +142,15 @@ def about(parent: QWidget, version: str) -> None:
     box.open()
 
 
-def suggested(folder: str, name: str) -> str:
-    """A path to begin a file dialog with."""
-    return str(Path(folder or Path.home()) / name)
+def beside_project(session: Session, name: str) -> str:
+    """A path to begin a file dialog with: a file called after the project, where such files belong."""
+    return str(session.place / f"{session.project.name} {name}".replace("/", "-"))
 
 
-def beside_project(document: Document, name: str) -> str:
-    """A path to begin a file dialog with: a file called after the project, beside it where it is saved."""
-    folder = "" if document.path is None else str(document.path.parent)
-    return suggested(folder, f"{document.project.name} {name}".replace("/", "-"))
-
-
-def export_csv(parent: QWidget, document: Document, name: str, what: str, write: Callable[[Path], None]) -> None:
+def export_csv(parent: QWidget, session: Session, name: str, what: str, write: Callable[[Path], None]) -> None:
     """Ask where, the project's `name` being proposed, and write there; what: cannot be done, if it cannot."""
     chosen, _ = QFileDialog.getSaveFileName(
-        parent, "Export", beside_project(document, f"{name}.csv"), "CSV table (*.csv)"
+        parent, "Export", beside_project(session, f"{name}.csv"), "CSV table (*.csv)"
     )
     if not chosen:
         return

@@ -5,7 +5,7 @@ Panels never talk to each other: they change the session, and follow its signals
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -213,6 +213,8 @@ class Session(QObject):
         """What the panel of the section shows in 3D, and the 3D view moves; None: nothing."""
         self.deviation: ShownDeviation | None = None
         """What the panel of the deviation shows in 3D; None: nothing."""
+        self.last_folder: Callable[[], str] = str
+        """Where a file was opened or saved last, as the preferences keep it; empty: nowhere yet."""
         self.document = document
         document.listeners.append(self.project_changed.emit)
 
@@ -242,6 +244,21 @@ class Session(QObject):
     @property
     def project(self) -> Project:
         return self.document.project
+
+    @property
+    def place(self) -> Path:
+        """Where dialogs for files begin: the project's folder, else where one was chosen last, else the person's own.
+
+        A copy that was recovered, which lies among the program's own files, is not saved: none begins there.
+        """
+        path = self.document.path
+        return self.last_place if path is None else path.parent
+
+    @property
+    def last_place(self) -> Path:
+        """Where a file was chosen last, whatever is open; else the person's own folder."""
+        last = self.last_folder()
+        return Path(last) if last and Path(last).is_dir() else Path.home()
 
     def replace_document(self, document: Document) -> None:
         """Open another project: history and selection start anew."""

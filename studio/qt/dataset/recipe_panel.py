@@ -95,7 +95,7 @@ class RecipePanel(QWidget):
     def ask_folder(self) -> bool:
         """False: none was chosen."""
         name = f"{self.work.name} images"
-        chosen = ask_results_folder(self, "Folder for the images", Path(self._place()), name)
+        chosen = ask_results_folder(self, "Folder for the images", self._place(), name)
         if chosen is not None:
             self.work.choose_folder(chosen)
         return chosen is not None
@@ -130,21 +130,18 @@ class RecipePanel(QWidget):
             fill_field_menu(menu, self.work.base, self.work.add)
 
     def _open(self) -> None:
-        chosen, _ = QFileDialog.getOpenFileName(self, "Open a recipe", self._place(), FILES)
+        chosen, _ = QFileDialog.getOpenFileName(self, "Open a recipe", str(self._place()), FILES)
         if chosen:
             self.work.load(Path(chosen))
 
     def _save(self) -> None:
-        suggestion = str(Path(self._place()) / f"{self.work.name}.json")
+        suggestion = str(self._place() / f"{self.work.name}.json")
         chosen, _ = QFileDialog.getSaveFileName(self, "Save the recipe", suggestion, FILES)
         if chosen:
             self.work.save(Path(chosen))
 
-    def _place(self) -> str:
-        if self.work.recipe.base not in DESCRIPTIONS:
-            return str(self.work.root)
-        path = self.session.document.path
-        return str(path.parent if path is not None else Path.home())
+    def _place(self) -> Path:
+        return self.session.place if self.work.recipe.base in DESCRIPTIONS else self.work.root
 
     def _connect(self) -> None:
         work = self.work

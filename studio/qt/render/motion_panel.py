@@ -42,7 +42,7 @@ from studio.scan.stages import scaled
 if TYPE_CHECKING:
     from studio.scan.scan import ScanResult
 
-SCALES = {"full size": 1.0, "half size": 0.5, "quarter size": 0.25}
+SCALES = {"full size": 1.0, "half size": 0.5, "quarter size": 0.25, "eighth size": 0.125}
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,11 @@ class MotionPanel(QWidget):
         self.told = QLabel()
         self.told.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.scale = ChoiceBox()
-        self.scale.addItems(list(SCALES))
-        self.scale.setCurrentIndex(1)
-        self.scale.setToolTip("Size of the rendered images: half size takes about a quarter of the time")
+        for text, scale in SCALES.items():
+            self.scale.addItem(text, scale)
+        self.scale.setToolTip(
+            "Size of the rendered images, at first that of the preferences: half size takes about a quarter of the time"
+        )
         self.run = QPushButton("Run the scan…")
         self.run.setToolTip("Render and measure every step, into a folder, with points and report")
         self.run.clicked.connect(lambda: self.ask_and_run())
@@ -116,8 +118,7 @@ class MotionPanel(QWidget):
         """Ask for the folder of the results, then run the scan; while something is rendered, nothing is asked."""
         if self._is_busy():
             return  # the folder that a person chooses is made
-        start = self.session.document.path
-        place = start.parent if start is not None else Path.home()
+        place = self.session.place
         name = unused_name(place, f"{self.session.project.name} scan")
         chosen = ask_results_folder(self, "Folder for the scan's results", place, name)
         if chosen is None:

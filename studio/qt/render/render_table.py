@@ -226,4 +226,4 @@ class RenderTable(QDialog):
         self.export.setEnabled(bool(self.rows))
 
     def _ask(self) -> None:
-        export_csv(self, self.session.document, "renders", "the table", self.write)
+        export_csv(self, self.session, "renders", "the table", self.write)

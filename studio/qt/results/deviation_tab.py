@@ -292,14 +292,12 @@ class DeviationTab(QWidget):
             self.told.setText(job.problem.text)
 
     def _choose(self) -> None:
-        path = self.session.document.path
-        start = Path.home() if path is None else path.parent  # a copy that was recovered lies among the program's own
-        chosen, _ = QFileDialog.getOpenFileName(self.window(), "Nominal part", str(start), FILES)
+        chosen, _ = QFileDialog.getOpenFileName(self.window(), "Nominal part", str(self.session.place), FILES)
         if chosen:
             self.take_nominal(Path(chosen))
 
     def _ask(self) -> None:
-        export_csv(self.window(), self.session.document, "deviation", "the deviation", self.write)
+        export_csv(self.window(), self.session, "deviation", "the deviation", self.write)
 
     def _show_rows(self) -> None:
         self.form.setRowVisible(self.spots, self.alignment.currentData() == "3-2-1")

@@ -15,7 +15,7 @@ from analysis.line.settings import Method
 from analysis.report.colour import method_name
 from render.base.threads import Cancel
 from studio.qt.core.actions import Actions
-from studio.qt.core.dialogs import show_trouble, suggested
+from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.jobs import RENDER, JobRunner
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Render, Session
@@ -93,7 +93,7 @@ class ExportActions(QObject):
         # the name says what the figures inside are of
         size = f" at {render.scanner_scale:.3g} x" if render is not None and render.scanner_scale != 1.0 else ""
         name = f"{self.session.project.name.replace('/', '-')}{size}{suffix}"
-        start = suggested(self.preferences.values.folder, name)
+        start = str(self.session.last_place / name)
         title = f"Export {self._of_what(key)}".strip()
         chosen, _ = QFileDialog.getSaveFileName(self.window, title, start, name_filter)
         if chosen:
@@ -191,7 +191,7 @@ class ExportActions(QObject):
     def screenshot(self) -> None:
         """The window as it is, as a PNG."""
         picture = self.window.grab()  # before the dialog covers it
-        start = suggested(self.preferences.values.folder, f"{self.session.project.name}.png")
+        start = str(self.session.last_place / f"{self.session.project.name}.png")
         chosen, _ = QFileDialog.getSaveFileName(self.window, "Save the screenshot", start, "PNG image (*.png)")
         if not chosen:
             return

@@ -287,7 +287,7 @@ class HeightMapTab(QWidget):
         self._show_profile()
 
     def _ask(self) -> None:
-        start = beside_project(self.session.document, "height map.png")
+        start = beside_project(self.session, "height map.png")
         chosen, kind = QFileDialog.getSaveFileName(self.window(), "Export", start, FILES)
         if not chosen:
             return

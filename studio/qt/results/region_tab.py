@@ -52,7 +52,7 @@ class RegionTab(QWidget):
         self.title = QLabel(wordWrap=True)
         self.table = ReadOnlyTable()
         self.table.setToolTip(f"<p>{EXPLAINED}</p>")
-        self.export: QPushButton = text_button("Export as CSV…", "The region's points, by the first method shown")
+        self.export: QPushButton = text_button("Export as CSV…", "The region's points, by every method shown")
         self.clear = text_button("Clear", "No region")
         buttons = QHBoxLayout()
         for button in (self.export, self.clear):
@@ -108,15 +108,16 @@ class RegionTab(QWidget):
     def write(self, path: Path) -> None:
         """InputError: there is nothing to write, or the file cannot be written."""
         render = self.session.shown
-        scan, first = self._scan_bar.whole, next(iter(self._shown.values()), None)
+        scan, shown = self._scan_bar.whole, self._shown
         if isinstance(self.region, Box) and scan is not None:
             points = points_of(scan.found.folder)
             count = export_box(path, self.region, read_cloud(points), self._laser, points)
-        elif render is None or self.region is None or first is None:
+        elif render is None or self.region is None or not shown:
             raise InputError("no region is chosen", cure="drag across the profile first")
         else:
-            count = export_region(path, self.region, first, render.project.scene, self.session.document.root)
-        self.session.message.emit("info", f"Wrote {path}: {count} points, {self.region.title}")
+            count = export_region(path, self.region, shown, render.project.scene, self.session.document.root)
+        methods = f" by {len(shown)} methods" if len(shown) > 1 and scan is None else ""
+        self.session.message.emit("info", f"Wrote {path}: {count} points{methods}, {self.region.title}")
 
     def _of_which(self, region: Region | Box) -> str:
         """Of a scan: scan lines and places across the fan are of the step that is looked at, a box may be of all."""
@@ -128,7 +129,7 @@ class RegionTab(QWidget):
         return f", of step {render.frame.step + 1} of {render.scan.count}"
 
     def _ask(self) -> None:
-        export_csv(self.window(), self.session.document, "region", "the region", self.write)
+        export_csv(self.window(), self.session, "region", "the region", self.write)
 
     def _tell(self) -> None:
         there = self.region is not None

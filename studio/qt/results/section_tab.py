@@ -254,7 +254,7 @@ class SectionTab(QWidget):
         plots.paint(self.plot)
 
     def _ask(self) -> None:
-        start = beside_project(self.session.document, "section.dxf")
+        start = beside_project(self.session, "section.dxf")
         chosen, kind = QFileDialog.getSaveFileName(self.window(), "Export", start, FILES)
         if not chosen:
             return

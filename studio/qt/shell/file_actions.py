@@ -22,7 +22,6 @@ from studio.qt.core.dialogs import (
     ask_under_way,
     ask_unsaved,
     show_trouble,
-    suggested,
 )
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
@@ -129,7 +128,7 @@ class FileActions(QObject):
         return True
 
     def open_dialog(self) -> bool:
-        name, _ = QFileDialog.getOpenFileName(self.window, "Open a project", self._folder(), FILTER)
+        name, _ = QFileDialog.getOpenFileName(self.window, "Open a project", str(self.session.place), FILTER)
         return bool(name) and self.open(Path(name))
 
     def open(self, path: Path, ask: bool = True) -> bool:
@@ -158,7 +157,7 @@ class FileActions(QObject):
         return True
 
     def open_results_dialog(self) -> bool:
-        name = QFileDialog.getExistingDirectory(self.window, "Open the results of a scan", self._folder())
+        name = QFileDialog.getExistingDirectory(self.window, "Open the results of a scan", str(self.session.place))
         return bool(name) and self.open_results(Path(name))
 
     def open_results(self, folder: Path, ask: bool = True) -> bool:
@@ -205,7 +204,7 @@ class FileActions(QObject):
 
     def save_as(self) -> bool:
         name = f"{self.session.project.name.replace('/', '-')}.json"
-        start = str(self.session.document.path or suggested(self._folder(), name))
+        start = str(self.session.document.path or self.session.place / name)
         chosen, _ = QFileDialog.getSaveFileName(self.window, "Save the project", start, FILTER)
         if not chosen:
             return False
@@ -311,7 +310,3 @@ class FileActions(QObject):
         what = trouble(error, doing)
         self.session.message.emit("error", str(what))
         show_trouble(self.window, what)
-
-    def _folder(self) -> str:
-        path = self.session.document.path
-        return str(path.parent) if path is not None else self.preferences.values.folder

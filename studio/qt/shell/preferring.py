@@ -70,8 +70,9 @@ class Preferring(QObject):
         self.window.files.keep_every(values.autosave_every if values.autosave else None)
 
     def _take_scale(self) -> None:
-        box = cast(Any, self.window.panels["render"]).scale
-        box.setCurrentIndex(max(0, box.findData(SCALES[self.window.preferences.values.image_scale][0])))
+        for panel in ("render", "motion"):
+            box = cast(Any, self.window.panels[panel]).scale
+            box.setCurrentIndex(max(0, box.findData(SCALES[self.window.preferences.values.image_scale][0])))
 
 
 class PreferencesDialog(QDialog):

@@ -85,6 +85,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.session = session
         self.preferences = preferences or PreferencesFile()
+        session.last_folder = lambda: self.preferences.values.folder
         self.workspace = ""
         self._called: set[str] = set()
         """Panels that no person put where they are."""

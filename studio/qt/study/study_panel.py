@@ -123,7 +123,7 @@ class StudyPanel(QWidget):
     def ask_folder(self) -> bool:
         """False: none was chosen."""
         name = f"{self.work.draft['name']} results"
-        chosen = ask_results_folder(self, "Folder for the study's results", Path(self._place()), name)
+        chosen = ask_results_folder(self, "Folder for the study's results", self.session.place, name)
         if chosen is not None:
             self.work.choose_folder(chosen)
         return chosen is not None
@@ -140,24 +140,20 @@ class StudyPanel(QWidget):
         menu.addAction("Save the study…", self._save)
 
     def _open(self) -> None:
-        chosen, _ = QFileDialog.getOpenFileName(self, "Open a study", self._place(), FILES)
+        chosen, _ = QFileDialog.getOpenFileName(self, "Open a study", str(self.session.place), FILES)
         if chosen:
             self.work.load(Path(chosen))
 
     def _open_results(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(self, "Folder of a study's results", self._place())
+        chosen = QFileDialog.getExistingDirectory(self, "Folder of a study's results", str(self.session.place))
         if chosen:
             self.work.open_folder(Path(chosen))
 
     def _save(self) -> None:
-        suggestion = str(Path(self._place()) / f"{self.work.draft['name']}.json")
+        suggestion = str(self.session.place / f"{self.work.draft['name']}.json")
         chosen, _ = QFileDialog.getSaveFileName(self, "Save the study", suggestion, FILES)
         if chosen:
             self.work.save(Path(chosen))
-
-    def _place(self) -> str:
-        path = self.session.document.path
-        return str(path.parent if path is not None else Path.home())
 
     def _add_sweep(self) -> None:
         work = self.work

@@ -234,6 +234,13 @@ def test_a_drag_over_rows_tells_of_their_errors_and_writes_their_points(
     with open(tmp_path / "region.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["row"]) for row in rows] == found.points.index[here].tolist()
+    # of two methods, which are both in the table, both are in the file
+    panel.region._shown = {"likelihood": found, "gaussian": found}
+    panel.region.write(tmp_path / "both.csv")
+    with open(tmp_path / "both.csv", newline="", encoding="utf-8") as file:
+        both = list(csv.DictReader(file))
+    assert [row.pop("method") for row in both] == ["likelihood"] * len(rows) + ["gaussian"] * len(rows)
+    assert both == rows + rows
     panel.region.clear.click()
     assert not panel.rows.spans[0].isVisible()
 

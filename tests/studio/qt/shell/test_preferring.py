@@ -39,7 +39,7 @@ def test_what_is_chosen_is_remembered_and_felt(window: MainWindow, qtbot: QtBot)
     kept = PreferencesFile(window.preferences.path.parent).values
     assert (kept.threads, kept.image_scale, kept.undo_depth, kept.autosave) == (1, "half", 10, False)
     assert thread_count(None) == 1 and thread_count(3) == 3
-    assert window.panels["render"].scale.currentData() == 0.5
+    assert window.panels["render"].scale.currentData() == window.panels["motion"].scale.currentData() == 0.5
     session = window.session
     for i in range(15):
         session.set(("seed",), i + 1)
