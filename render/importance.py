@@ -53,6 +53,8 @@ class Importance:
         return np.asarray(self.allowed * np.sqrt(variance[measured]))
 
 
+LEAST_SAMPLES = 4
+"""Of ambient light, a pixel, with which lines can be looked at: the first of both halves."""
 LINES_KNOWN = 0.95
 """Share of the lines that a goal is met for: a few about bright corners or hidden edges would keep all others waiting.
 What is told of them all is the deviation that so many are below."""

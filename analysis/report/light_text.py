@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from render.importance import LINES_KNOWN
+from render.importance import LEAST_SAMPLES, LINES_KNOWN
 from render.plan import GroupQuality, Plan, ThinLens, TransportStep, line_noise
 
 LIGHT = {
@@ -207,6 +207,10 @@ def _ambient(step: TransportStep, plan: Plan) -> tuple[bool, str]:
     if step.name == "ambient":
         width, height = plan.image_size or (0, 0)
         effort = f"to {plan.ambient_error or 0.0:.1%} or {plan.ambient_samples} samples a pixel"
+        # with fewer the lines cannot be looked at, and the image is rendered in their place
+        if plan.goal is not None and (plan.ambient_samples or 0) >= LEAST_SAMPLES:
+            most = f"{plan.ambient_samples} samples a pixel on average at most"
+            effort = f"about the line as well as the goal needs, elsewhere of few samples and interpolated; {most}"
         return True, f"ambient: {light} on {width} x {height} pixels, {effort}"
     if step.reason == "switched off":
         return False, f"{light} - switched off, its share was not measured"

@@ -11,22 +11,20 @@ import numpy as np
 
 from render.ambient.coarse_image import COARSE_ERROR, TILE, CoarseImage, coarse_image
 from render.ambient.integrator import AmbientImage, ambient_images
-from render.ambient.line_samples import PILOT, band_of, sample_band
+from render.ambient.line_samples import band_of, sample_band
 from render.ambient.path_state import CLAMPED, INVALID
 from render.ambient.path_tracer import CameraPaths, camera_paths
 from render.ambient.pixel_samples import PixelSamples
 from render.ambient.taught_image import CHECK_SEED, CoarseLesson, taken_over
 from render.base.arrays import Float, Float32, Int
 from render.base.threads import map_chunks
-from render.importance import Importance, known_below
+from render.importance import LEAST_SAMPLES, Importance, known_below
 from render.run import Run
 from render.world.placed import PlacedScene
 
 COARSE_SAMPLES, COARSE_SHARE = 0.5, 0.125
 """Most samples a pixel, and of those that are allowed, for the coarse image: where what it does not reach matters, the
 band is wider."""
-LEAST_SAMPLES = 2 * PILOT
-"""Samples a pixel with which lines can be looked at."""
 COARSE = "coarse ambient"
 """Part of a memory and of the lessons of a block."""
 

@@ -311,8 +311,8 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
 def _aim(scene: Scene, cancelled: Cancel) -> None:
     """What a goal asks of reflected light, and ambient light for what is measured."""
     from render.ambient.line_samples import pool
-    from render.ambient.measured_light import LEAST_SAMPLES, measured_images
-    from render.importance import Importance
+    from render.ambient.measured_light import measured_images
+    from render.importance import LEAST_SAMPLES, Importance
     from render.laser_indirect.accumulator import PASSES_A_WAVE
     from render.laser_indirect.integrator import empty_buffer
     from render.laser_indirect.line_goal import Effect, LineErrors

@@ -47,7 +47,7 @@ class SnapMove(ViewMode):
             return
         target = self.gizmo.target
         if target is None:
-            session.message.emit("error", "nothing that can be moved is selected; click on it")
+            session.message.emit("info", "nothing that can be moved is selected; click on it")
             return
         self.gizmo.away = True  # its handles would lie over the corners
         self._taken = None if self._own_meshes() else target.T_world_item[:3, 3].copy()

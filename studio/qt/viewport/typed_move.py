@@ -47,7 +47,7 @@ class TypedMove(ViewMode):
         self.cancel()
         target, session = self.gizmo.target, self.gizmo.session
         if target is None:
-            session.message.emit("error", "nothing that can be moved is selected; click on it")
+            session.message.emit("info", "nothing that can be moved is selected; click on it")
             return
         if session.dragging:
             return

@@ -54,6 +54,16 @@ def test_a_step_is_said_with_its_reason_and_its_share(one, said):
     assert len(done) == (not line.startswith("left out: ")) and [*done, *left_out] == [line.removeprefix("left out: ")]
 
 
+def test_ambient_light_for_the_line_is_not_said_to_be_as_well_known_as_an_image():
+    """A report said that it went to 1.0 %, beside an error of 5.84 % at 0.119 samples a pixel."""
+    light = (step("always", True, name="ambient", group="ambient"),)
+    plan = Plan(light, ambient_error=0.01, ambient_samples=4, image_size=(612, 512))
+    assert plan_lines(plan)[0].endswith("on 612 x 512 pixels, to 1.0% or 4 samples a pixel")
+    told = plan_lines(replace(plan, goal=0.1))[-1]
+    assert "about the line as well as the goal needs" in told and "1.0%" not in told
+    assert plan_lines(replace(plan, goal=0.1, ambient_samples=3))[-1].endswith("to 1.0% or 3 samples a pixel")
+
+
 def test_what_comes_with_another_step_names_that_one():
     steps = step("implied", True, 0.01, 0.0), step("pilot", True, 0.1, 0.0, "specular-chain")
     assert "comes with specular-chain" in plan_lines(Plan(steps))[0]
