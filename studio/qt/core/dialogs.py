@@ -71,8 +71,8 @@ def ask_under_way(parent: QWidget, what: str) -> bool:
     return box.clickedButton() is stopped
 
 
-def ask_recovery(parent: QWidget | None, name: str, when: str, count: int) -> bool:
-    """Whether to open the work that a crash left behind."""
+def ask_recovery(parent: QWidget | None, name: str, when: str, count: int) -> Literal["open", "discard", "later"]:
+    """What to do with the work that a crash left behind; later: it is offered again at the next start."""
     button = QMessageBox.StandardButton
     box = QMessageBox(QMessageBox.Icon.Question, "Recovery", f"Open the unsaved work on “{name}”?", parent=parent)
     box.setObjectName("recovery")
@@ -81,10 +81,11 @@ def ask_recovery(parent: QWidget | None, name: str, when: str, count: int) -> bo
     )
     box.setInformativeText(f"The program did not close properly. It kept the work of {when}.{others}")
     opened = box.addButton("Open it", QMessageBox.ButtonRole.AcceptRole)
-    box.addButton("Throw it away", QMessageBox.ButtonRole.DestructiveRole)
+    thrown = box.addButton("Throw it away", QMessageBox.ButtonRole.DestructiveRole)
+    box.setEscapeButton(box.addButton("Later", QMessageBox.ButtonRole.RejectRole))
     box.setDefaultButton(button.NoButton)
     box.exec()
-    return box.clickedButton() is opened
+    return "open" if box.clickedButton() is opened else "discard" if box.clickedButton() is thrown else "later"
 
 
 class TemplateDialog(QDialog):

@@ -248,12 +248,14 @@ class FileActions(QObject):
         return self._offer(find(self.autosave.folder))
 
     def _offer(self, left: list[Recovery]) -> bool:
-        """The latest of what crashes left behind, to open or to throw away. True: it was opened."""
+        """The latest of what crashes left behind, to open, to throw away or to leave. True: it was opened."""
         if not left:
             return False
         when = read_out(left[0].when)
-        if not ask_recovery(self.window, left[0].project.name, when, len(left)):
-            left[0].discard()
+        answer = ask_recovery(self.window, left[0].project.name, when, len(left))
+        if answer != "open":
+            if answer == "discard":
+                left[0].discard()
             return False
         document = left[0].document()
         if left[0].is_draft:

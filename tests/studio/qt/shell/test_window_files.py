@@ -214,6 +214,17 @@ class TestFiles:
         assert window.session.project == Project.load(small_project) and not window.isWindowModified()
         assert not crashed.file.exists()
 
+    def test_work_may_wait_and_is_offered_again(self, window: MainWindow, qtbot: QtBot, small_project: Path) -> None:
+        """Who only wanted to look at something else had to open it, or to throw it away."""
+        crashed = self.left_by_a_crash(window, small_project)
+        answer(qtbot, "recovery", "Later")
+        assert window.files.open(small_project)
+        assert window.session.project == Project.load(small_project) and not window.isWindowModified()
+        assert crashed.file.exists()
+        answer(qtbot, "recovery", "Open it")
+        assert window.files.open(small_project)
+        assert window.session.project.scene.lasers[0].power == 0.007 and not crashed.file.exists()
+
     def test_work_of_another_project_waits_untouched(self, window: MainWindow, small_project: Path) -> None:
         crashed = self.left_by_a_crash(window, small_project.with_name("other.json"))
         assert window.files.open(small_project)
