@@ -27,7 +27,6 @@ SHAPES = {
     "export": "<path d='M12 15V3M8 7l4-4 4 4M5 13v7h14v-7'/>",
     "picture": "<path d='M4 5h16v14H4zM4 16l5-5 4 4 3-3 4 4'/><circle cx='9' cy='9' r='1.2'/>",
     "help": "<path d='M9 9a3 3 0 1 1 4.5 2.6c-1 .6-1.5 1.1-1.5 2.4M12 17.5v.5'/><circle cx='12' cy='12' r='9.5'/>",
-    "warning": "<path d='M12 3.5L22 20.5H2zM12 10v5M12 17.6v.4'/>",
     "mesh": "<path d='M12 3l8 5v8l-8 5-8-5V8zM4 8l8 5 8-5M12 13v8'/>",
 }
 DOCUMENT = (

@@ -24,7 +24,6 @@ from render.world.world import build_world
 from studio.project.date_and_time import read_out
 from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.figures_age import FiguresAge
-from studio.qt.core.icons import icon
 from studio.qt.core.session import Render, Session, one_of
 from studio.qt.core.widgets import room_for_a_window, text_button
 from studio.runtime.error_messages import trouble
@@ -39,6 +38,7 @@ HINT = (
 )
 MOST_NOTES = 4
 """Of measures, below the table."""
+RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 FEWEST_PX, WIDEST_PX = 230, 1280
 
 
@@ -164,17 +164,24 @@ class RenderTable(QDialog):
     def _tell(self) -> None:
         measuring = [MEASURING] if self.age.old else []
         self.developed.setText(developed_as(self.renders, self.session.project) if self.renders else "")
-        notes = [
+        notes = [f"{mark} {text}" for mark, text in zip(self._marks(), self._notes(), strict=True)]
+        more = [f"{len(notes) - MOST_NOTES} more are told where the mouse rests on their cells"]
+        more = more if len(notes) > MOST_NOTES else []
+        told = [*scale_warnings(self.renders), *notes[:MOST_NOTES], *more, *measuring, HINT, *self.wrong]
+        self.told.setText("\n".join(told))
+
+    def _notes(self) -> list[str]:
+        """What is told of measures, row by row."""
+        return [
             f"{one.name}, {row.label.rpartition(' / ')[0]}: {note}"
             for row in self.rows
             for one, note in zip(self.renders, row.notes, strict=False)
             if note
         ]
-        more = [f"{len(notes) - MOST_NOTES} more are told where the mouse rests on their cells"] * (
-            len(notes) > MOST_NOTES
-        )
-        told = [*scale_warnings(self.renders), *notes[:MOST_NOTES], *more, *measuring, HINT, *self.wrong]
-        self.told.setText("\n".join(told))
+
+    def _marks(self) -> list[str]:
+        """1, 2, ... as small raised figures, which lead from a cell to its note."""
+        return [str(number).translate(RAISED) for number in range(1, 1 + len(self._notes()))]
 
     def chosen(self) -> Kept | None:
         """The kept render of the column that is chosen."""
@@ -199,6 +206,7 @@ class RenderTable(QDialog):
     def _fill(self) -> None:
         table, bold = self.table, QFont(self.font())
         bold.setBold(True)
+        marks = iter(self._marks())
         table.setColumnCount(len(self.renders))
         table.setRowCount(len(self.rows))
         for k, render in enumerate(self.renders):
@@ -216,7 +224,7 @@ class RenderTable(QDialog):
                 note = row.notes[k] if row.notes else ""
                 item.setToolTip(f"<p>{escape(text)}</p><p>{escape(note)}</p>" if note else text)
                 if note:
-                    item.setIcon(icon("warning"))
+                    item.setText(f"{text} {next(marks)}")
                 if row.measured:
                     item.setFont(bold)
         table.horizontalHeader().setMinimumSectionSize(FEWEST_PX)

@@ -10,12 +10,13 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from analysis.gauges.gauge import Gauge
+from analysis.gauges.read import Reading
 from render.base.errors import InputError
 from studio.project.document import Document
 from studio.qt.core.session import Render, Session
 from studio.qt.render.history import History, describe, in_short, title
-from studio.qt.render.render_table import FEWEST_PX, as_kept, keep_render, open_render
-from studio.scan.kept_renders import kept_renders
+from studio.qt.render.render_table import FEWEST_PX, RenderTable, as_kept, keep_render, open_render
+from studio.scan.kept_renders import Kept, kept_renders
 from studio.scan.redevelop import develop_again, development, measure_again
 from studio.study.side_by_side import side_by_side
 from tests.studio.qt.small_session import small_project, small_render
@@ -193,3 +194,23 @@ def test_a_project_without_a_file_keeps_nothing(qtbot: QtBot) -> None:
     world, frame = small_render()
     with pytest.raises(InputError, match="no folder"):
         keep_render(session, Render(1, small_project(), world, frame), "one")
+
+
+def test_what_must_be_known_before_measures_are_compared_stands_below_with_a_mark(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gauge = Gauge(name="rise", kind="step", regions=((-0.1, 0.0), (0.0, 0.1)))
+    project = small_project().model_copy(update={"measures": (gauge,)})
+
+    def of(name: str, value: float, reason: str = "") -> Kept:
+        reading = Reading(gauge, 0, value, 4e-6, 0.0, truth=value, reason=reason)
+        return Kept(name, "", project, 1.0, {}, readings=(reading,))
+
+    kept = [of("a", 0.0791), of("b", 0.0009), of("c", np.nan, "no points in its first region")]
+    monkeypatch.setattr(RenderTable, "_read", lambda table: (kept, side_by_side(kept)))
+    table = RenderTable(None, Session(Document(project)), [])
+    qtbot.addWidget(table)
+    texts = [table.table.item(0, k).text() for k in range(3)]  # type: ignore[union-attr]
+    assert texts[0] == "79.1000\u00a0mm" and texts[1].endswith("(-78.2000\u00a0mm) ¹") and texts[2] == "– ²"
+    assert "¹ b, rise: exact here 0.9000\u00a0mm" in table.told.text()
+    assert "² c, rise: no points in its first region" in table.told.text()
