@@ -27,6 +27,8 @@ STILL = 1e-9
 """m: a step of the alignment that moves no point farther ends it."""
 FAR = 6.0
 """Robust sigmas from the median beyond which a point is no part of the best fit."""
+PLACE = 5
+"""Points whose median is that of a place."""
 FAR_OFF = "far off: beyond 6 robust sigma of all"
 """What such a point is called."""
 FREE = 0.1
@@ -204,8 +206,8 @@ def verdict_of(judged: Verdicts) -> Verdict:
 def callouts(points: Float, value: Float, count: int, apart: float) -> list[tuple[int, float]]:
     """The places to point at: index of a point, and the median deviation around it, the largest first.
 
-    apart: m; a median is over half of it, so that noise of one point is no place, and places are no nearer than it.
-    What is smaller than SMALL of the largest is not worth pointing at.
+    apart: m; a median is over half of it, and places are no nearer than it. Fewer than PLACE points are none, as strays
+    are, unless there are no more anywhere. What is smaller than SMALL of the largest is not worth pointing at.
     """
     if len(points) == 0:
         return []
@@ -213,8 +215,10 @@ def callouts(points: Float, value: Float, count: int, apart: float) -> list[tupl
     chosen: list[tuple[int, float]] = []
     # cells in place of points: a median for each of a million points would take minutes
     cells = np.unique(np.floor(points / (apart / 4.0)).astype(np.int64), axis=0, return_index=True)[1]
-    local = np.array([float(np.median(value[around])) for around in tree.query_ball_point(points[cells], apart / 2.0)])
-    left = np.ones(len(cells), dtype=np.bool_)
+    around = tree.query_ball_point(points[cells], apart / 2.0)
+    local = np.array([float(np.median(value[each])) for each in around])
+    left = np.array([len(each) >= PLACE for each in around])
+    left |= not left.any()
     while left.any() and len(chosen) < count:
         best = int(np.argmax(np.where(left, np.abs(local), -1.0)))
         if chosen and abs(local[best]) < SMALL * abs(chosen[0][1]):

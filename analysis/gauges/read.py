@@ -29,6 +29,7 @@ MISFITS = {
     "peak": "points miss its parabola by {:.0f} times their sigma: value and truth may be off the top; of a flat one "
     "take a step height, else a narrower region"
 }
+STRAY = "the exact line does not reach its regions: the value is of stray light or noise"
 NO_TRUTH = "; the exact line does not reach there either, so that the area has no truth"
 STRAIGHTEST = 10.0
 """Lengths of its region, of the radius of an edge: beyond, the points are those of a flat side."""
@@ -101,6 +102,8 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
         hidden = unseen(measured, gauge.regions[1], fits[0].frame)
         systematic, remark = math.hypot(systematic, hidden.sigma), hidden.remark
         remark += NO_TRUTH if remark and math.isnan(true) else ""
+    elif truth is not None and isinstance(parts_of(gauge, truth), str):
+        remark = STRAY
     if not remark and ratio > MISFIT:
         remark = MISFITS.get(gauge.kind, OTHER_SHAPE).format(ratio)
     one = Reading(gauge, step, value, ratio * random, systematic, int(used), true, "", remark)

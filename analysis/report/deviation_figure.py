@@ -89,7 +89,8 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         drawing.xaxis.set_major_locator(MaxNLocator(max(1, min(8, round(8.0 * wide / max(tall, 1e-9)))), integer=True))
         named, apart = _of_the_part(what, place)
         drawing.set_title(
-            f"Deviation from the nominal surface, + outside (too much){_without_number(len(place) - len(named))}"
+            f"Deviation from the nominal surface, + outside (too much)\n"
+            f"A number is the median of a place{_without_number(len(place) - len(named))}"
         )
         fine = np.linspace(edges[0], edges[-1], 49) * 1e6
         counts, _ = np.histogram(clipped, fine)
@@ -110,7 +111,7 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
 def _without_number(count: int) -> str:
     if count == 0:
         return ""
-    return f"\n{count} far-off point{' beside it has' if count == 1 else 's beside it have'} no number"
+    return f", {count} stray point{' has' if count == 1 else 's have'} none"
 
 
 def _of_the_part(what: DeviationMap, place: Float) -> tuple[NDArray[np.int64], float]:

@@ -106,7 +106,9 @@ def worst_of(row: Mapping[str, Any]) -> str:
     if row["reason"] or row["readings"] <= 1:
         return ""
     measured = " measured" if "none" in (row.get("verdicts") or {}) else ""
-    return f"worst{measured}: step {row['step'] + 1} of {row['readings']}"
+    judged = row["lower"] is not None or row["upper"] is not None
+    what = "worst" if judged else "farthest off the " + ("truth" if row["nominal"] is None else "nominal")
+    return f"{what}{measured}: step {row['step'] + 1} of {row['readings']}"
 
 
 def verdict_text(verdict: str | None, oblique: float | None = None) -> str:

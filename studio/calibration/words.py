@@ -96,7 +96,7 @@ def check_rows(result: Calibrated, views: int) -> list[tuple[str, str]]:
 def lens_sentence(terms: int, trials: Sequence[LensTrial]) -> str:
     """Which lens was chosen and why, and how every lens that was tried did at views that it was not fitted to."""
     tried = "; ".join(_trial_words(one, trials, terms) for one in trials)
-    depth = ", the depth error" if any(one.depth for one in trials) else ""
+    depth = ", how far off its boards depth was" if any(one.depth for one in trials) else ""
     return (
         f"{terms} distortion terms: no lens with more is proved better on views that were left out of its fit. Each "
         f"lens with the mean squared residual there{depth}, and the chance p that noise alone makes one with more "

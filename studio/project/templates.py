@@ -22,7 +22,7 @@ DESCRIPTIONS = {
     "step_block": "five steps of 10 mm: depth linearity",
     "glass_ball": "a glass ball in the beam, half of the line seen through a plate: caustics",
     "v_groove": "a 90 degree groove: inner corners",
-    "scan": "the step block swept by a linear stage, 20 frames",
+    "scan": "the scanner swept over the step block by a linear stage, 20 frames",
 }
 PROJECT_NAME = "project.json"
 FOLDER = Path(__file__).resolve().parents[2] / "assets" / "projects"

@@ -102,14 +102,17 @@ def _number(value: object) -> float:
 def worst(found: Sequence[Reading]) -> Reading:
     """Of one measure over the steps, one with a value where there is one: by verdict, then the least within its limits.
 
-    Without limits the farthest off its nominal, and without that off the truth.
+    Without limits the farthest off its nominal, and without that off the truth; where the exact line does not reach,
+    off what the steps have in the middle.
     """
+    values = [one.value for one in found if math.isfinite(one.value)]
+    middle = float(np.median(values)) if values else math.nan
 
     def badness(one: Reading) -> tuple[bool, bool, bool, float]:
         gauge = one.gauge
         low, high = gauge.limits
         if gauge.nominal is None:
-            off = abs(one.error)
+            off = abs(one.error if math.isfinite(one.error) else one.value - middle)
         elif low == -math.inf and high == math.inf:
             off = abs(one.value - gauge.nominal)
         else:

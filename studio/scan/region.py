@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.cloud import Cloud, at_first_step, cloud, merge, write_csv
+from analysis.cloud import Cloud, at_first_step, cloud, merge, ply_pieces, write_csv
 from analysis.measures import FEWEST, error_statistics, median_length
 from render.base.arrays import Float
 from render.base.errors import InputError
@@ -93,11 +93,26 @@ class Box:
         return Region("scan lines", places.min(), places.max()).across(found, scene, section) if len(places) else None
 
 
+def members(region: Region | Box, found: Sequence[Measurement], scene: Scene) -> list[NDArray[np.bool_]]:
+    """(m,) for each measurement, the points that a region compares.
+
+    Of a box the scan lines that the first has in it: by their own errors points of a worse method lie outside, and
+    only its best ones would count.
+    """
+    if isinstance(region, Region) or not found:
+        return [region.of(one, scene) for one in found]
+    first, *others = found
+    here = region.of(first, scene)
+    lines = first.points.index[here]
+    return [here, *(one.points.valid & np.isin(one.points.index, lines) for one in others)]
+
+
 def region_table(
-    region: Region | Box, found: list[Measurement], scene: Scene, view: ErrorView
+    region: Region | Box, found: Sequence[Measurement], scene: Scene, view: ErrorView
 ) -> list[tuple[str, list[str]]]:
     """Name and, for each measurement, what is shown of the errors within the region: value and its sigma."""
-    return _rows([_figures(region.of(one, scene), one, view) for one in found], view)
+    here = members(region, found, scene)
+    return _rows([_figures(*pair, view) for pair in zip(here, found, strict=True)], view)
 
 
 def scan_errors(region: Box | None, points: Cloud, laser: int, view: ErrorView) -> Float:
@@ -135,10 +150,11 @@ def _figures(here: NDArray[np.bool_], found: Measurement, view: ErrorView) -> li
 
 def _statistics(error: Float, index: NDArray[np.intp], length: Float) -> list[str]:
     known = np.isfinite(error)
+    count = str(len(error)) if known.all() else f"{len(error)}, {np.count_nonzero(known)} with an error"
     if np.count_nonzero(known) < FEWEST:
-        return [str(len(error)), "-", "-", "-"]
+        return [count, "-", "-", "-"]
     figures = error_statistics(error[known], index[known], median_length(length[known]))
-    return [str(len(error)), *(_with_sigma(*pair) for pair in figures)]
+    return [count, *(_with_sigma(*pair) for pair in figures)]
 
 
 def _with_sigma(value: float, sigma: float) -> str:
@@ -153,8 +169,8 @@ def export_region(path: Path, region: Region | Box, found: Mapping[str, Measurem
     Gives how many. InputError: none, or the file cannot be written.
     """
     parts = []
-    for method, one in found.items():
-        kept = region.of(one, scene)[one.points.valid]
+    for (method, one), here in zip(found.items(), members(region, list(found.values()), scene), strict=True):
+        kept = here[one.points.valid]
         columns = cloud(one.points, one.errors, one.laser, one.step, scene)
         named = {"method": np.full(np.count_nonzero(kept), method)} if len(found) > 1 else {}
         parts.append(named | {name: column[kept] for name, column in columns.items()})
@@ -167,11 +183,16 @@ def export_region(path: Path, region: Region | Box, found: Mapping[str, Measurem
     return count
 
 
-def export_box(path: Path, region: Box, points: Cloud, laser: int, scanned: Path) -> int:
-    """Likewise of all steps of a scan, whose file of points is `scanned`."""
-    here = region.of_cloud(points, laser)
-    if not here.any():
+def export_box(path: Path, region: Box, laser: int, scanned: Path) -> int:
+    """Likewise of all steps of a scan, with all columns of its file of points. InputError: as of `ply_pieces` too."""
+    parts = []
+    for piece in ply_pieces(scanned):
+        here = region.of_cloud(piece, laser)
+        parts.append({name: column[here] for name, column in piece.items()})
+    points = merge(parts)
+    count = len(points["row"])
+    if not count:
         raise InputError("no point is within the region", where=region.title, cure="draw a wider one")
     check_not_read([path], [scanned])
-    write_csv(path, {name: column[here] for name, column in points.items()})
-    return int(here.sum())
+    write_csv(path, points)
+    return count

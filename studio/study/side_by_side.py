@@ -192,7 +192,7 @@ def _note(one: Reading | None, first: Reading | None, name: str) -> str:
         apart, own = one.value - first.value, one.truth - first.truth
         if abs(own) > 0.5 * abs(apart) and not abs(apart) <= SURE * math.hypot(one.sigma, first.sigma):
             exact = value_text(one.truth, None, one.gauge.unit), value_text(first.truth, None, one.gauge.unit)
-            told.append(f"exact here {exact[0]}, in {name} {exact[1]}: these regions lie on another place of the part")
+            told.append(f"exact here {exact[0]}, in {name} {exact[1]}: the part in these regions is another")
     return "; ".join(told)
 
 

@@ -70,6 +70,12 @@ class CalibrationWork(QObject):
         self.truth: Estimate | None = None
         self.dropped: set[str] = set()
         self.solved: Solved | None = None
+        self.kept: Solved | None = None
+        """What was saved or used last: closing loses nothing of it."""
+        self.note = ""
+        """Why the advised view did not bring what it was to."""
+        self._advised_terms: int | None = None
+        """Of the lens for which the view that was taken had been advised."""
         self.checked: Recheck | None = None
         """Whether the calibration that was chosen still holds."""
         self.shown = ""
@@ -171,6 +177,7 @@ class CalibrationWork(QObject):
         solved = self.solved
         if self.material is None or self.truth is None or solved is None or solved.result.advice is None:
             return
+        self._advised_terms = len(solved.result.estimate.distortion)
         try:
             self._take(as_advised(self.material, self.truth, solved.result.advice, solved.board))
         except InputError as error:
@@ -348,7 +355,13 @@ class CalibrationWork(QObject):
         if isinstance(found, str):
             self._fail(found)
             return
+        before, self._advised_terms, self.note = self._advised_terms, None, ""
         self.solved, self.checked = (found, None) if isinstance(found, Solved) else (None, found)
+        if isinstance(found, Solved) and before not in (None, now := len(found.result.estimate.distortion)):
+            self.note = (
+                f"The lens has {now} distortion terms now, and had {before} when this view was advised: what it was to "
+                "gain was foretold for that one."
+            )
         self.solved_changed.emit()
 
     def _forget(self) -> None:

@@ -40,6 +40,7 @@ def save(work: CalibrationWork, file: Path, form: str = "") -> None:
     except InputError as error:
         work.tell(in_window(error))
         return
+    work.kept = work.solved
     work.session.message.emit("info", f"Saved the {'camera' if form else 'calibration'}: {file}")
     work.tell("")
 
@@ -48,6 +49,7 @@ def use(work: CalibrationWork) -> None:
     """Points of the project are made with what was found."""
     if work.solved is not None:
         _use(work, _data(work))
+        work.kept = work.solved
 
 
 def use_file(work: CalibrationWork, file: Path) -> None:

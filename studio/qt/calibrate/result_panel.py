@@ -46,11 +46,11 @@ class CalibrationPanel(QWidget):
         elif solved is None:
             self.text.setHtml(f"<p style='color: {theme.colours().muted}'>{EMPTY}</p>")
         else:
-            self.text.setHtml(page(solved, self.work.target_um))
+            self.text.setHtml(page(solved, self.work.target_um, self.work.note))
         self.text.verticalScrollBar().setValue(place)
 
 
-def page(solved: Solved, target_um: float | None) -> str:
+def page(solved: Solved, target_um: float | None, note: str = "") -> str:
     """The result as rich text, in the order in which it matters."""
     from studio.calibration.words import check_rows, depth_rows, next_sentence, parameter_rows
 
@@ -67,6 +67,8 @@ def page(solved: Solved, target_um: float | None) -> str:
     if result.advice is not None:
         name, _, told = next_sentence(result.advice, target_um).partition(": ")
         parts.append(f"<p style='color: {c.good if name == 'enough' else c.accent}'><b>{name}</b> {escape(told)}</p>")
+    if note:
+        parts.append(f"<p style='color: {c.muted}'>{escape(note)}</p>")
     for name, sentence in check_rows(result, solved.views):
         parts.append(f"<p><b>{escape(name)}</b> {escape(sentence)}</p>")
     parts += ["<p></p>", _table(["Parameter", "value", "sigma"], parameter_rows(result, solved.names))]

@@ -71,6 +71,19 @@ def ask_under_way(parent: QWidget, what: str) -> bool:
     return box.clickedButton() is stopped
 
 
+def ask_loss(parent: QWidget, what: str) -> bool:
+    """Whether to close although work of minutes goes with it; what: sentences about it."""
+    box = QMessageBox(QMessageBox.Icon.Question, "Not kept", "Close without it?", parent=parent)
+    box.setObjectName("not-kept")
+    box.setInformativeText(what)
+    closed = box.addButton("Close", QMessageBox.ButtonRole.DestructiveRole)
+    stay = box.addButton("Stay", QMessageBox.ButtonRole.RejectRole)
+    box.setDefaultButton(stay)
+    box.setEscapeButton(stay)
+    box.exec()
+    return box.clickedButton() is closed
+
+
 def ask_recovery(parent: QWidget | None, name: str, when: str, count: int) -> Literal["open", "discard", "later"]:
     """What to do with the work that a crash left behind; later: it is offered again at the next start."""
     button = QMessageBox.StandardButton
@@ -79,7 +92,7 @@ def ask_recovery(parent: QWidget | None, name: str, when: str, count: int) -> Li
     others = {1: "", 2: " An older one stays for the next time."}.get(
         count, f" {count - 1} older ones stay for the next time."
     )
-    box.setInformativeText(f"The program did not close properly. It kept the work of {when}.{others}")
+    box.setInformativeText(f"The program was cut off; it had kept the work of {when}.{others}")
     opened = box.addButton("Open it", QMessageBox.ButtonRole.AcceptRole)
     thrown = box.addButton("Throw it away", QMessageBox.ButtonRole.DestructiveRole)
     box.setEscapeButton(box.addButton("Later", QMessageBox.ButtonRole.RejectRole))

@@ -7,6 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QTableWidgetItem, QVBoxLayout, QWidget
 
+from analysis.report.colour import method_name
 from render.base.errors import InputError
 from studio.qt.core.dialogs import export_csv
 from studio.qt.core.session import Session
@@ -14,7 +15,6 @@ from studio.qt.core.widgets import text_button
 from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.plots import PointedPlots
 from studio.qt.results.scan_bar import ScanBar
-from studio.scan.deviation import read_cloud
 from studio.scan.height_map import points_of
 from studio.scan.region import Box, Region, export_box, export_region, region_table, scan_table
 from studio.scan.result_series import ErrorView
@@ -110,8 +110,7 @@ class RegionTab(QWidget):
         render = self.session.shown
         scan, shown = self._scan_bar.whole, self._shown
         if isinstance(self.region, Box) and scan is not None:
-            points = points_of(scan.found.folder)
-            count = export_box(path, self.region, read_cloud(points), self._laser, points)
+            count = export_box(path, self.region, self._laser, points_of(scan.found.folder))
         elif render is None or self.region is None or not shown:
             raise InputError("no region is chosen", cure="drag across the profile first")
         else:
@@ -128,13 +127,24 @@ class RegionTab(QWidget):
             return f", of all {render.scan.count} steps"
         return f", of step {render.frame.step + 1} of {render.scan.count}"
 
+    def _by_which(self, region: Region | Box) -> str:
+        """Why a box shows one method, or by whose points it chooses the scan lines of all."""
+        if not isinstance(region, Box) or not self._shown:
+            return ""
+        first = method_name(next(iter(self._shown)))
+        if self._scan_bar.whole is not None:
+            return ": a scan keeps the points of one method"
+        return f": the scan lines whose points by {first} lie in it" if len(self._shown) > 1 else ""
+
     def _ask(self) -> None:
         export_csv(self.window(), self.session, "region", "the region", self.write)
 
     def _tell(self) -> None:
         there = self.region is not None
         self.title.setText(
-            HINT if self.region is None else f"<b>{self.region.title.capitalize()}{self._of_which(self.region)}</b>"
+            HINT
+            if self.region is None
+            else f"<b>{self.region.title.capitalize()}{self._of_which(self.region)}</b>{self._by_which(self.region)}"
         )
         self.title.setObjectName("" if there else "muted")
         self.title.style().polish(self.title)

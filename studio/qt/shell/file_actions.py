@@ -18,6 +18,7 @@ from studio.project.project_files import carry, missing_files
 from studio.project.templates import template_folder
 from studio.qt.core.dialogs import (
     TemplateDialog,
+    ask_loss,
     ask_recovery,
     ask_under_way,
     ask_unsaved,
@@ -102,7 +103,7 @@ class FileActions(QObject):
         super().__init__(window)
         self.window, self.session, self.preferences = window, session, preferences
         self.autosave = autosave or Autosave(recovery_folder())
-        self.going: Callable[[], Going] = Going
+        self.going: Callable[..., Going] = lambda *, quits=False: Going()
         """What goes with the document beside its changes."""
         self._pristine: Project | None = session.project
         """As it came from a template or a file: closing it unchanged needs no question; None: it came unsaved."""
@@ -211,11 +212,16 @@ class FileActions(QObject):
         path = Path(chosen)
         return self._save(path if path.suffix else path.with_suffix(".json"))
 
-    def may_close(self) -> bool:
-        """Whether the document may be given up; asks when there is unsaved work, or a render under way."""
-        going = self.going()
+    def may_close(self, *, quits: bool = False) -> bool:
+        """Whether the document may be given up; asks where unsaved work, a render under way or work of minutes goes.
+
+        quits: the window with it.
+        """
+        going = self.going(quits=quits)
         if not self.unsaved:
-            return not going.render or ask_under_way(self.window, going.render)
+            if going.render:
+                return ask_under_way(self.window, going.render)
+            return not going.costly or ask_loss(self.window, going.costly)
         answer = ask_unsaved(self.window, self.session.project.name, going.told)
         return answer == "discard" or (answer == "save" and self.save())
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from analysis.report.units import percent
-from studio.qt.core.jobs import RENDER, JobRunner
+from studio.qt.calibrate.calibration_work import CalibrationWork
+from studio.qt.core.jobs import RENDER, JobRunner, duration
 from studio.qt.core.session import Session
 from studio.qt.shell.panels import Panels
 
+COSTLY = 60.0
+"""s of work that nobody wants to do again for a slip of the hand."""
 STAY = "Keep with the project, in the menu of the list of renders, keeps one."
 
 
@@ -19,21 +22,47 @@ class Going:
     render: str = ""
     renders: int = 0
     """Made by a person in this session and kept nowhere."""
+    seconds: float = 0.0
+    """That they took."""
+    calibration: str = ""
+    """A sentence about the one that only the window holds, if it closes; empty: there is none."""
 
     @property
     def told(self) -> str:
-        """Of both; empty: nothing goes."""
+        """Of all; empty: nothing goes."""
         many = "" if self.renders == 1 else "s"
         go = "goes" if self.renders == 1 else "go"
         made = f"{self.renders} render{many} of this session {go} as well, whether saved or not. {STAY}"
-        return "\n\n".join(filter(None, [self.render, made if self.renders else ""]))
+        return "\n\n".join(filter(None, [self.render, made if self.renders else "", self.calibration]))
+
+    @property
+    def costly(self) -> str:
+        """Where no change is unsaved, what is asked about all the same; empty: nothing that took long goes."""
+        one = self.renders == 1
+        made = (
+            f"{self.renders} render{'' if one else 's'} of this session, {duration(self.seconds)} of work, "
+            f"{'is' if one else 'are'} kept nowhere. {STAY}"
+        )
+        return "\n\n".join(filter(None, [made if self.seconds >= COSTLY else "", self.calibration]))
 
 
-def what_goes(session: Session, runner: JobRunner, panels: Panels) -> Going:
-    """A scan or study under way is not told of: what is measured stays in its folder, and the next run goes on."""
+def what_goes(session: Session, runner: JobRunner, panels: Panels, *, quits: bool = False) -> Going:
+    """A scan or study under way is not told of: what is measured stays in its folder, and the next run goes on.
+
+    quits: the window closes, not the project alone.
+    """
     job = runner.job(RENDER)
     asked = job is not None and job.name == "render" and panels["render"].asked and not job.cancel_asked  # type: ignore[attr-defined]
     done = percent(job.done, 0) if asked and job is not None else ""
     told = f"A render is under way, {done} of it done, and is lost." if done else ""
     made = [one for one in session.renders if one.asked and not (one.kept or one.scan or one.cell or one.refining)]
-    return Going(told, len(made))
+    seconds = sum(sum(one.frame.seconds.values()) for one in made)
+    return Going(told, len(made), seconds, _calibration(session) if quits else "")
+
+
+def _calibration(session: Session) -> str:
+    """Of photographs, which stay when another project is opened; virtual boards are made again in seconds."""
+    work = session.findChild(CalibrationWork)
+    if work is None or work.virtual or work.solved is None or work.solved is work.kept:
+        return ""
+    return "What was calibrated from photographs is neither saved nor used in a project, and goes as well."

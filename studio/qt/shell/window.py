@@ -166,7 +166,7 @@ class MainWindow(QMainWindow):
             QTimer.singleShot(0, self, self.panels.make_soon)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        if not self.files.may_close():
+        if not self.files.may_close(quits=True):
             event.ignore()
             return
         self._send_back()

@@ -141,6 +141,16 @@ def test_a_region_without_points_is_told_by_its_name_and_place() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_a_value_where_the_exact_line_is_not_is_told_to_be_of_stray_points() -> None:
+    """Of 28 stray points a step of -412 mm was told without a word."""
+    height = np.where(ACROSS > 0.0, 0.01, 0.0)
+    there = profile(height)
+    nowhere = there.taken(np.abs(there.position[:, 0]) < 1e-6)
+    reading = read(gauge("step"), 0, there, nowhere)
+    assert np.isfinite(reading.value) and np.isnan(reading.truth) and "stray light or noise" in reading.remark
+    assert read(gauge("step"), 0, there, there).remark == read(gauge("step"), 0, there, None).remark == ""
+
+
 def test_noise_that_is_wild_everywhere_leaves_a_value_or_a_reason(kind: str) -> None:
     """Each round of leaving points out finds others, to the last round."""
     height, _ = shape(kind)

@@ -38,8 +38,8 @@ def test_far_off_points_beside_the_part_are_counted_and_a_dent_is_pointed_at(cou
     value[stray] = -np.linspace(0.1, 0.4, count)
     made = draw(DeviationMap(np.column_stack([x, y, value]), value, UP, -5e-5, 5e-5))
     assert [one.get_text() for one in made.axes[0].texts] == ["1: -300 µm"]
-    told = {0: "", 1: "1 far-off point beside it has no number", 7: "7 far-off points beside it have no number"}[count]
-    assert made.axes[0].get_title(loc="left").partition("\n")[2] == told
+    told = {0: "", 1: ", 1 stray point has none", 7: ", 7 stray points have none"}[count]
+    assert made.axes[0].get_title(loc="left").partition("\n")[2] == f"A number is the median of a place{told}"
 
 
 @pytest.mark.parametrize("is_tall", [False, True])

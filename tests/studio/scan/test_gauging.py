@@ -14,7 +14,7 @@ from click.testing import CliRunner
 import main
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import cells, reasons
+from analysis.report.gauge_table import cells, reasons, worst_of
 from analysis.report.units import NONE
 from render.base.errors import InputError
 from studio.project.project import Project
@@ -115,6 +115,12 @@ def test_the_worst_reading_without_a_nominal_is_the_farthest_off_the_truth() -> 
     gauge = Gauge(kind="step", regions=((-0.08, -0.01), (0.01, 0.08)))
     readings = [Reading(gauge, step, value=0.01 + off, truth=0.01) for step, off in enumerate((1e-6, -2e-5, 9e-6))]
     assert worst(readings).step == 1
+    # of stray points, where the exact line does not reach: 464 mm from all others it was passed over
+    away = Reading(gauge, 3, value=-0.412485, sigma_random=0.0192)
+    assert worst([*readings, away]).step == 3
+    (row,) = measures_record((gauge,), [*readings, away])
+    assert worst_of(row) == "farthest off the truth: step 4 of 4"
+    assert worst([away]).step == 3
 
 
 @pytest.mark.parametrize(

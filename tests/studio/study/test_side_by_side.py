@@ -93,7 +93,7 @@ def test_a_difference_that_is_the_parts_own_says_so_and_has_the_unit_of_its_valu
     nothing = of("d", math.nan, math.nan, reason="no points in its first region")
     (row,) = side_by_side([of("a", 0.0791, 0.0791), of("b", 0.000865, 0.00086), of("c", 0.07915, 0.0791), nothing])
     assert row.cells[1].endswith("(-78.2350\u00a0mm)") and row.cells[2].endswith("(+50.0\u00a0µm)")
-    told = "exact here 0.8600\u00a0mm, in a 79.1000\u00a0mm: these regions lie on another place of the part"
+    told = "exact here 0.8600\u00a0mm, in a 79.1000\u00a0mm: the part in these regions is another"
     assert row.notes == ("", told, "", "no points in its first region")
 
 

@@ -16,6 +16,7 @@ from studio.qt.calibrate.board_view import COVERAGE, DEPTH, NEXT, RESIDUALS, TAB
 from studio.qt.calibrate.calibrate_panel import NARROWEST
 from studio.qt.calibrate.keeping import FORMS, save, use, use_file
 from studio.qt.core import theme
+from studio.qt.shell.going import what_goes
 from tests.analysis.calibration.boards import SIZE
 from tests.studio.qt.calibrate.calibrate_desk import LINE, VIEWS, Desk, seen, settled
 from tests.studio.qt.shell.window_hands import contrast
@@ -136,6 +137,30 @@ class TestPictures:
         assert now.estimate.rotation[-1] == pytest.approx(advice.rotation, abs=2e-3)
         # the other views' noise, which 8 views let into the estimate, is in neither alike
         assert (before.depth[0].rms - now.depth[0].rms) / advice.gain == pytest.approx(1.0, abs=0.1)
+
+    def test_a_lens_that_changes_with_the_advised_view_is_told(self, solved: Desk) -> None:
+        """73 um were to become 63 and stayed 73: the lens had four terms more, and nothing said so."""
+        work = solved.work
+        assert work.solved is not None
+        work._advised_terms = 4
+        work._take_solved(work.solved)
+        assert "The lens has 0 distortion terms now, and had 4" in solved.found.text.toPlainText()
+        work._take_solved(work.solved)
+        assert "The lens has" not in solved.found.text.toPlainText()
+
+    def test_what_only_the_window_holds_is_told_before_it_closes(self, solved: Desk, tmp_path: Path) -> None:
+        work = solved.work
+
+        def going(quits: bool = True) -> str:
+            return what_goes(work.session, solved.runner, {}, quits=quits).costly  # type: ignore[arg-type]
+
+        assert "calibrated from photographs is neither saved nor used" in going()
+        assert going(quits=False) == "", "photographs stay when another project is opened"
+        work.virtual = True
+        assert going() == ""
+        work.virtual = False
+        save(work, tmp_path / "calibration.json")
+        assert going() == ""
 
     def test_tabs_without_room_scroll_and_keep_their_words(self, solved: Desk) -> None:
         tabs = solved.boards.tabs

@@ -59,7 +59,12 @@ def test_its_figures_are_of_all_steps(panel: ResultsPanel, tmp_path: Path) -> No
     assert float(shown_texts[2].split(" ± ")[0]) == pytest.approx(rmse, rel=0.02)
     panel.region.write(tmp_path / "box.csv")
     with open(tmp_path / "box.csv", newline="", encoding="utf-8") as file:
-        assert sum(1 for _ in csv.reader(file)) == np.count_nonzero(here) + 1
+        rows = list(csv.DictReader(file))
+    # its figures can be had from it again
+    assert len(rows) == np.count_nonzero(here) and {"u_px", "error_surface_m"} <= rows[0].keys()
+    written = np.array([float(row["error_depth_m"] or "nan") for row in rows])
+    np.testing.assert_allclose(written, error, rtol=1e-9)
+    assert "keeps the points of one method" in panel.region.title.text()
 
 
 def test_figures_of_a_sample_say_of_which(panel: ResultsPanel) -> None:

@@ -20,7 +20,7 @@ from studio.qt.results.measures_table import shown
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell.window import MainWindow
 from studio.qt.viewport.error_cloud import ErrorCloud
-from studio.scan.region import Region
+from studio.scan.region import Region, members
 from studio.scan.stages import Clock, develop_step, measure_step, render_step
 
 METHODS = ("likelihood", "gaussian", "centre_of_mass")
@@ -273,8 +273,13 @@ def test_a_rectangle_about_points_is_a_region_of_them(
     assert int(results.region.table.item(0, 0).text()) == count >= np.count_nonzero(inside)
     results.region.write(tmp_path / "box.csv")
     scene = window.session.shown.project.scene
-    counts = [np.count_nonzero(box.of(one, scene)) for one in results.shown().values()]
+    counts = [np.count_nonzero(here) for here in members(box, list(results.shown().values()), scene)]
     assert counts[0] == count and len((tmp_path / "box.csv").read_text().splitlines()) == sum(counts) + 1
+    # the others are compared at the same scan lines: by their own errors some of their points lie outside
+    lines = set(found.points.index[box.of(found, scene)])
+    for one, number in zip(results.shown().values(), counts, strict=True):
+        assert number == np.count_nonzero(one.points.valid & np.isin(one.points.index, list(lines)))
+    assert "the scan lines whose points by maximum likelihood" in results.region.title.text()
     results.region.clear.click()
     assert cloud.box is None
 
