@@ -129,12 +129,12 @@ class RegionTab(QWidget):
 
     def _by_which(self, region: Region | Box) -> str:
         """Why a box shows one method, or by whose points it chooses the scan lines of all."""
-        if not isinstance(region, Box) or not self._shown:
+        if not isinstance(region, Box):
             return ""
-        first = method_name(next(iter(self._shown)))
         if self._scan_bar.whole is not None:
             return ": a scan keeps the points of one method"
-        return f": the scan lines whose points by {first} lie in it" if len(self._shown) > 1 else ""
+        first, *others = self._shown or ("",)
+        return f": the scan lines whose points by {method_name(first)} lie in it" if others else ""
 
     def _ask(self) -> None:
         export_csv(self.window(), self.session, "region", "the region", self.write)

@@ -140,7 +140,6 @@ def test_a_region_without_points_is_told_by_its_name_and_place() -> None:
     assert reading.reason.startswith("too few points in the region 'arc' (100 to 200 mm)")
 
 
-@pytest.mark.parametrize("kind", KINDS)
 def test_a_value_where_the_exact_line_is_not_is_told_to_be_of_stray_points() -> None:
     """Of 28 stray points a step of -412 mm was told without a word."""
     height = np.where(ACROSS > 0.0, 0.01, 0.0)
@@ -151,6 +150,7 @@ def test_a_value_where_the_exact_line_is_not_is_told_to_be_of_stray_points() -> 
     assert read(gauge("step"), 0, there, there).remark == read(gauge("step"), 0, there, None).remark == ""
 
 
+@pytest.mark.parametrize("kind", KINDS)
 def test_noise_that_is_wild_everywhere_leaves_a_value_or_a_reason(kind: str) -> None:
     """Each round of leaving points out finds others, to the last round."""
     height, _ = shape(kind)

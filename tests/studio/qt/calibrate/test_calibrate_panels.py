@@ -154,6 +154,7 @@ class TestPictures:
         def going(quits: bool = True) -> str:
             return what_goes(work.session, solved.runner, {}, quits=quits).costly  # type: ignore[arg-type]
 
+        work.virtual = False  # as if they were of photographs
         assert "calibrated from photographs is neither saved nor used" in going()
         assert going(quits=False) == "", "photographs stay when another project is opened"
         work.virtual = True

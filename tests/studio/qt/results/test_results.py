@@ -225,6 +225,7 @@ class TestMotion:
         with qtbot.waitSignal(moving.runner.finished, timeout=60_000):
             assert panel.run_into(tmp_path / "scan", report=False) is not None  # type: ignore[attr-defined]
         assert len(sizes) == 3 and sizes[0] < sizes[1] < sizes[2]
+        qtbot.waitUntil(lambda: len(moving.cloud.points) > 0)  # those of the results take the place of what grew
         ys = moving.cloud.points[:, 1]
         assert math.isclose(np.ptp(ys), np.ptp(ys[: sizes[0]]) + 0.004, abs_tol=0.002)
         assert (tmp_path / "scan" / "points.ply").is_file()
