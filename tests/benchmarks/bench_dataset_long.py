@@ -79,7 +79,7 @@ def efficiency(names: list[str], processes: int) -> int:
         recipe, root, _ = scaled(name)
         alone, together = (made_after(recipe, root, count) for count in (1, processes))
         perfect = perfectly(np.diff(alone, prepend=0.0), processes)
-        one, best, all_of_them = ((each[-1] - each[FIRST]) / COMPARED for each in (alone, perfect, together))
+        one, best, all_of_them = ((each[-1] - each[FIRST - 1]) / COMPARED for each in (alone, perfect, together))
         wanted, took = wanted + best, took + all_of_them
         told = f"{all_of_them:.2f} by {processes} processes, {best:.2f} by perfect ones"
         print(f"{name:14} {one:.2f} s a scene, {told}: {best / all_of_them:.2f}", flush=True)

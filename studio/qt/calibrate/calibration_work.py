@@ -177,11 +177,13 @@ class CalibrationWork(QObject):
         solved = self.solved
         if self.material is None or self.truth is None or solved is None or solved.result.advice is None:
             return
-        self._advised_terms = len(solved.result.estimate.distortion)
         try:
-            self._take(as_advised(self.material, self.truth, solved.result.advice, solved.board))
+            material = as_advised(self.material, self.truth, solved.result.advice, solved.board)
         except InputError as error:
             self.tell(str(error))
+            return
+        self._advised_terms = len(solved.result.estimate.distortion)
+        self._take(material)
 
     def choose_board(self, text: str) -> None:
         if text.strip() != self.board_text:

@@ -40,15 +40,15 @@ def save(work: CalibrationWork, file: Path, form: str = "") -> None:
     except InputError as error:
         work.tell(in_window(error))
         return
-    work.kept = work.solved
+    if not form:  # formats of others hold the camera alone
+        work.kept = work.solved
     work.session.message.emit("info", f"Saved the {'camera' if form else 'calibration'}: {file}")
     work.tell("")
 
 
 def use(work: CalibrationWork) -> None:
     """Points of the project are made with what was found."""
-    if work.solved is not None:
-        _use(work, _data(work))
+    if work.solved is not None and _use(work, _data(work)):
         work.kept = work.solved
 
 
@@ -71,16 +71,18 @@ def remove(work: CalibrationWork) -> None:
     work.session.set(("calibration",), Calibration(), "remove the calibration")
 
 
-def _use(work: CalibrationWork, data: dict[str, Any]) -> None:
+def _use(work: CalibrationWork, data: dict[str, Any]) -> bool:
+    """False: the project does not take it, which is told."""
     from studio.calibration.solving import of_project
 
     try:
         work.session.document.set(("calibration",), of_project(data), "use the calibration")
     except InputError as error:
         work.tell(f"The project does not take the calibration: {error}")
-        return
+        return False
     work.session.message.emit("info", "Points of the project are made with the calibration")
     work.tell("")
+    return True
 
 
 def _data(work: CalibrationWork) -> dict[str, Any]:

@@ -60,28 +60,25 @@ def ask_unsaved(parent: QWidget, name: str, more: str = "") -> Answer:
 
 def ask_under_way(parent: QWidget, what: str) -> bool:
     """Whether to go although a render is under way; what: a sentence about it."""
-    box = QMessageBox(QMessageBox.Icon.Question, "Under way", "Stop the render?", parent=parent)
-    box.setObjectName("under-way")
-    box.setInformativeText(what)
-    stopped = box.addButton("Stop it", QMessageBox.ButtonRole.DestructiveRole)
-    stay = box.addButton("Stay", QMessageBox.ButtonRole.RejectRole)
-    box.setDefaultButton(stay)
-    box.setEscapeButton(stay)
-    box.exec()
-    return box.clickedButton() is stopped
+    return _ask_to_go(parent, "under-way", "Under way", "Stop the render?", "Stop it", what)
 
 
 def ask_loss(parent: QWidget, what: str) -> bool:
     """Whether to close although work of minutes goes with it; what: sentences about it."""
-    box = QMessageBox(QMessageBox.Icon.Question, "Not kept", "Close without it?", parent=parent)
-    box.setObjectName("not-kept")
+    return _ask_to_go(parent, "not-kept", "Not kept", "Close without it?", "Close", what)
+
+
+def _ask_to_go(parent: QWidget, name: str, title: str, question: str, go: str, what: str) -> bool:
+    """go: the button that goes on; Return and Esc stay."""
+    box = QMessageBox(QMessageBox.Icon.Question, title, question, parent=parent)
+    box.setObjectName(name)
     box.setInformativeText(what)
-    closed = box.addButton("Close", QMessageBox.ButtonRole.DestructiveRole)
+    gone = box.addButton(go, QMessageBox.ButtonRole.DestructiveRole)
     stay = box.addButton("Stay", QMessageBox.ButtonRole.RejectRole)
     box.setDefaultButton(stay)
     box.setEscapeButton(stay)
     box.exec()
-    return box.clickedButton() is closed
+    return box.clickedButton() is gone
 
 
 def ask_recovery(parent: QWidget | None, name: str, when: str, count: int) -> Literal["open", "discard", "later"]:

@@ -160,6 +160,8 @@ class TestPictures:
         work.virtual = True
         assert going() == ""
         work.virtual = False
+        save(work, tmp_path / "camera.yaml", "opencv")
+        assert going() != "", "a camera's file has no laser"
         save(work, tmp_path / "calibration.json")
         assert going() == ""
 
@@ -276,6 +278,7 @@ class TestKeeping:
         solved.session.set(("scene", "rig", "camera"), camera)
         use(solved.work)
         assert "2448 x 2048" in solved.panel.problem.text() and solved.session.project.calibration.camera is None
+        assert solved.work.kept is None
 
     def test_the_camera_is_written_for_others_as_the_dialog_says(
         self, solved: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
