@@ -180,8 +180,9 @@ def test_a_recipe_or_a_study_never_replaces_a_project(desk: Desk, tmp_path: Path
     assert "would replace a project" in desk.work.problem and file.read_text() == text
     desk.work.begin_with_project()
     assert not desk.work.save(file) and file.read_text() == text
+    sweep = {"name": "power", "vary": [{"field": "scene.rig.lasers[0].power", "values": [0.01]}]}
     with pytest.raises(InputError, match="the study would replace a project"):
-        write_study(file, Study.model_validate({"base": "plane", "sweeps": []}), desk.session.document, {})
+        write_study(file, Study.model_validate({"base": "plane", "sweeps": [sweep]}), desk.session.document, {})
     assert file.read_text() == text
 
 
