@@ -105,10 +105,12 @@ def worst_of(row: Mapping[str, Any]) -> str:
     """Which of its steps such an entry has its value of; empty: there is one step, or no value."""
     if row["reason"] or row["readings"] <= 1:
         return ""
-    measured = " measured" if "none" in (row.get("verdicts") or {}) else ""
-    judged = row["lower"] is not None or row["upper"] is not None
-    what = "worst" if judged else "farthest off the " + ("truth" if row["nominal"] is None else "nominal")
-    return f"{what}{measured}: step {row['step'] + 1} of {row['readings']}"
+    some = "none" in (row.get("verdicts") or {})
+    if row["lower"] is not None or row["upper"] is not None:
+        what = "worst measured" if some else "worst"
+    else:
+        what = f"farthest off the {'truth' if row['nominal'] is None else 'nominal'}{' of those measured' * some}"
+    return f"{what}: step {row['step'] + 1} of {row['readings']}"
 
 
 def verdict_text(verdict: str | None, oblique: float | None = None) -> str:

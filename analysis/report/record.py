@@ -101,7 +101,8 @@ class ScanRecord:
         for group, quantities in OF_GROUPS.items():
             for i, one in enumerate(one for one in frame.quality if one.group == group):
                 for name, quantity in quantities.items():
-                    value = getattr(one, name)
+                    # of light for the line the error is of its position, in sigmas
+                    value = one.image_error if name == "error" and one.of == "line" else getattr(one, name)
                     if value is not None and value == value:  # an error may not be known
                         yield quantity if one.laser is None else quantity.of(i), float(value)
 

@@ -65,7 +65,12 @@ def scale_note(image_scale: float) -> str:
     """What figures at another image scale than the scanner's are worth; empty at its own."""
     if image_scale == 1.0:
         return ""
-    each = f"Each pixel is {1 / image_scale:.3g} times as large there; full" if image_scale < 1.0 else "Full"
+    times = 1.0 / image_scale
+    each = (
+        f"Each pixel is {times:.3g} times as large there, exposed for 1/{times**2:.3g} of the time; full"
+        if times > 1.0
+        else "Full"
+    )
     return f"{scale_head(image_scale)} {each} size (image scale 1) gives those."
 
 
@@ -104,8 +109,8 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
         their = "its" if found.false_rows == 1 else "their"
         carry = f"{'carries' if found.false_rows == 1 else 'carry'} a point although no line crosses {their}"
         said.append(
-            f"{counted(found.false_rows, 'false scan line')} {carry} centre, at the ends of the line or from stray "
-            f"light. {their.capitalize()} distance from the surface counts, {their} depth has no truth."
+            f"{counted(found.false_rows, 'false scan line')} {carry} centre, at the ends of the line, from stray "
+            f"light or noise alone. {their.capitalize()} distance from the surface counts, {their} depth has no truth."
         )
     # what most points err by, all alike and each on its own
     usual = np.hypot(found.depth_z.median, found.depth_z.robust_sigma)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +122,7 @@ def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None
         "details": details,
         "details_left_out": f"{more} more lasers are in the tables below." if more > 0 else "",
         "gauge_columns": gauge_table.COLUMNS,
-        "gauge_rows": [(row["name"], gauge_table.cells(row)) for row in report.measures],
+        "gauge_rows": [(_of_laser(report, row), gauge_table.cells(row)) for row in report.measures],
         "gauge_definitions": gauge_table.definitions(list(report.measures)),
         "gauge_note": report.measures_note,
         "gauge_reasons": gauge_table.reasons(list(report.measures)),
@@ -225,6 +225,12 @@ def write_pdf(page: str, path: Path) -> None:
     logging.getLogger("weasyprint").setLevel(logging.ERROR)
     # the page refers to nothing outside itself; if it ever did, nothing would be fetched
     HTML(string=page, url_fetcher=URLFetcher(allowed_protocols=("data",))).write_pdf(path)
+
+
+def _of_laser(report: ReportInput, row: Mapping[str, Any]) -> str:
+    """A measure's name, with its laser's where there are several."""
+    lasers = report.scene.lasers
+    return f"{row['name']} ({lasers[row['laser']].name})" if len(lasers) > 1 else str(row["name"])
 
 
 def _motion(report: ReportInput) -> dict[str, Any] | None:

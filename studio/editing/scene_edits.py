@@ -158,9 +158,9 @@ def add_light(project: Project, kind: type[PointLight] | type[RectangleLight]) -
 
 def remove(project: Project, path: FieldPath) -> Result:
     """Without an item; the path is the neighbour's that takes its place, or the list's owner."""
-    items = list(_items(project, path))
-    del items[_index(path)]
-    result = replaced(project, path[:-1], tuple(items))
+    order = list(range(len(_items(project, path))))
+    del order[_index(path)]
+    result, items = _rearranged(project, path, order), order
     if items:
         return result, (*path[:-1], min(_index(path), len(items) - 1))
     return result, path[:-1]
@@ -175,9 +175,11 @@ def duplicate(project: Project, path: FieldPath) -> Result:
     pose: Pose = getattr(item, field)
     x, y, z = pose.translation
     moved = pose.model_copy(update={"translation": (x, round(y + shift, 9), z)})
-    items = list(_items(project, path))
-    items.insert(_index(path) + 1, item.model_copy(update={"name": name, field: moved}))
-    return replaced(project, path[:-1], tuple(items)), (*path[:-1], _index(path) + 1)
+    after = (*path[:-1], _index(path) + 1)
+    order = list(range(len(_items(project, path))))
+    order.insert(_index(after), _index(path))
+    copied = item.model_copy(update={"name": name, field: moved})
+    return _rearranged(project, path, order, (_index(after), copied)), after
 
 
 def remove_all(project: Project, paths: Sequence[FieldPath]) -> Result:
@@ -214,10 +216,10 @@ def set_visible(project: Project, path: FieldPath, visible: bool) -> Project:
 
 def move(project: Project, path: FieldPath, index: int) -> Result:
     """An item to another place in its list."""
-    items = list(_items(project, path))
-    index = max(0, min(index, len(items) - 1))
-    items.insert(index, items.pop(_index(path)))
-    return replaced(project, path[:-1], tuple(items)), (*path[:-1], index)
+    order = list(range(len(_items(project, path))))
+    index = max(0, min(index, len(order) - 1))
+    order.insert(index, order.pop(_index(path)))
+    return _rearranged(project, path, order), (*path[:-1], index)
 
 
 def new_motion(project: Project, kind: type[BaseModel]) -> Motion:
@@ -249,6 +251,27 @@ def _items(project: Project, path: FieldPath) -> tuple[Any, ...]:
     if not in_list(path):
         raise KeyError(path)
     return tuple(value_at(project, path[:-1]))
+
+
+def _rearranged(project: Project, path: FieldPath, order: Sequence[int], new: tuple[int, Any] | None = None) -> Project:
+    """The list of an item in another order, by the places that its items had; new: a place, and what takes it instead.
+
+    Measures follow their laser: by its number alone they would be those of another. Those of one that is gone go.
+    """
+    before = _items(project, path)
+    place, other = new or (-1, None)
+    items = tuple(other if at == place else before[was] for at, was in enumerate(order))
+    if path[:-1] != LASERS:
+        return replaced(project, path[:-1], items)
+    measures = tuple(
+        gauge.model_copy(update={"laser": order.index(gauge.laser)})
+        for gauge in project.measures
+        if gauge.laser in order
+    )
+    edits = [(("measures",), measures), (path[:-1], items)]
+    for at, value in edits if len(items) < len(before) else reversed(edits):  # no measure of a laser that is not there
+        project = replaced(project, at, value)
+    return project
 
 
 def _index(path: FieldPath) -> int:

@@ -149,6 +149,9 @@ class Project(Model):
     @classmethod
     def from_data(cls, data: dict[str, Any], where: str = "project") -> Self:
         """As `load`, from the file's JSON object."""
+        if "base" in data and "scene" not in data:
+            kind, place = ("study", "Study") if "sweeps" in data else ("recipe of a dataset", "Dataset")
+            raise InputError(f"a {kind}, not a project", where=where, cure=f"open it in the workspace {place}")
         data = migrate(data, where)
         try:
             # through JSON text, because only there strict validation takes a list for a tuple

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import shutil
 from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel
 
@@ -15,6 +16,7 @@ from render.mesh.trimesh_reader import side_files
 from render.scene.scene import Scene
 from render.scene.shape import MeshFile
 from studio.project.project import Project
+from studio.project.strict_json import read_object
 
 
 def named_files(item: BaseModel, where: str) -> dict[str, str]:
@@ -29,6 +31,18 @@ def named_files(item: BaseModel, where: str) -> dict[str, str]:
                 place = f"{where}.{name}[{i}]" if isinstance(value, tuple) else f"{where}.{name}"
                 found = named_files(each, place) | found
     return found
+
+
+def check_no_project(file: Path, what: str) -> None:
+    """InputError: a project is in the file that something else is to be written into: it would be lost.
+
+    what: is to be written. Of a file that cannot be read whoever chose it has said that it may be replaced.
+    """
+    data: dict[str, Any] = {}
+    with contextlib.suppress(InputError):
+        data = read_object(file)
+    if "scene" in data:
+        raise InputError(f"the {what} would replace a project", where=str(file), cure="give it another name")
 
 
 def in_project(path: str, root: Path) -> str:

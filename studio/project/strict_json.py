@@ -79,7 +79,7 @@ def _read(path: Path, what: str) -> str:
             f"the {what} is not UTF-8 text",
             where=f"{where}, byte {error.start}",
             found=f"0x{data[error.start]:02x}",
-            cure="save it as UTF-8",
+            cure="save it as UTF-8" if path.suffix.lower() == ".json" else f"choose a {what}, whose name ends in .json",
         ) from None
 
 

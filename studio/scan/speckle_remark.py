@@ -44,9 +44,11 @@ def speckle_remark(project: Project, measured: Sequence[Measured], of: str = "")
         sigma = _depth_sigma(project, i, one)
         robust = one.errors.depth_z.robust_sigma
         if sigma > robust:
+            which = f" of {project.scene.lasers[i].name}" if len(measured) > 1 else ""
             return (
-                f"Laser speckle is switched off in the sensor: these errors, {micrometres(robust)} robust sigma{of}, "
-                f"have none of it, where a laser on a rough surface scatters depth by about {micrometres(sigma)}. "
+                f"Laser speckle is switched off in the sensor: these errors{which}, {micrometres(robust)} robust sigma"
+                f"{of}, have none of it, where a laser on a rough surface scatters depth by about "
+                f"{micrometres(sigma)}. "
                 "Switch it on (sensor, Laser speckle) for what a real scanner of this kind meets."
             )
     return ""

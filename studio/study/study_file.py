@@ -9,6 +9,7 @@ from render.base.errors import InputError
 from render.base.files import atomic_write
 from studio.project.document import Document
 from studio.project.project import Project
+from studio.project.project_files import check_no_project
 from studio.project.strict_json import pretty
 from studio.project.templates import DESCRIPTIONS, FOLDER
 from studio.study.study import Study, base_project
@@ -24,6 +25,7 @@ def base_name(document: Document) -> str:
 
 def write_study(file: Path, study: Study, document: Document, loaded: Mapping[str, Project]) -> None:
     """Of the open document, or of bases that came from files. InputError: it cannot be written, or finds no base."""
+    check_no_project(file, "study")
     base = _base_from(file.parent, study.base, document, loaded)
     data = study.model_copy(update={"base": base}).model_dump(mode="json", exclude_defaults=True)
     with atomic_write(file) as temporary:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QWheelEvent
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QSlider, QSpinBox, QWidget
 
 GIVEN_BACK = (Qt.FocusReason.ActiveWindowFocusReason, Qt.FocusReason.PopupFocusReason)
@@ -50,11 +50,23 @@ class ChoiceBox(StillBox, QComboBox):
     """One of a list."""
 
 
-class WholeBox(StillBox, QSpinBox):
+class NumberBox(StillBox):
+    """A box of a number, which is to be undone where the number is kept, and not in the box."""
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
+            keys = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo)
+            if not self.lineEdit().isModified() and any(event.matches(key) for key in keys):  # type: ignore[attr-defined]
+                event.ignore()
+                return False
+        return super().event(event)
+
+
+class WholeBox(NumberBox, QSpinBox):
     """A whole number."""
 
 
-class DecimalBox(StillBox, QDoubleSpinBox):
+class DecimalBox(NumberBox, QDoubleSpinBox):
     """A number with decimals."""
 
 

@@ -21,6 +21,7 @@ from studio.dataset.run import Result, Wanted, make_dataset
 from studio.editing.forms import FieldSpec
 from studio.project.document import FieldPath
 from studio.project.project import Project
+from studio.project.project_files import check_no_project
 from studio.project.strict_json import pretty
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.long_work import LongWork
@@ -144,6 +145,7 @@ class DatasetWork(LongWork):
         data = self.recipe.model_dump(mode="json", exclude_defaults=True)
         try:
             check_place(self.recipe, self.root, file.parent)
+            check_no_project(file, "recipe")
             with atomic_write(file) as temporary:
                 temporary.write_text(pretty({"schema_version": 1, **data}) + "\n", encoding="utf-8")
         except InputError as error:

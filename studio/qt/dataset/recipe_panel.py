@@ -135,7 +135,8 @@ class RecipePanel(QWidget):
             self.work.load(Path(chosen))
 
     def _save(self) -> None:
-        suggestion = str(self._place() / f"{self.work.name}.json")
+        name = self.work.name.removesuffix(" recipe")  # a project of the same name may lie there
+        suggestion = str(self._place() / f"{name} recipe.json")
         chosen, _ = QFileDialog.getSaveFileName(self, "Save the recipe", suggestion, FILES)
         if chosen:
             self.work.save(Path(chosen))

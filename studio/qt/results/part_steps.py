@@ -13,7 +13,8 @@ from studio.scan.gauging import judged_over_steps, step_readings
 from studio.scan.scan_results import ScanResults
 
 AGAIN = "Measure > Measure the scan again"
-LAST = "as measured last, by the tolerance of now"
+MEASURED_LAST = "as measured last"
+LAST = f"{MEASURED_LAST}, by the tolerance of now"
 
 
 class PartSteps:
@@ -73,7 +74,8 @@ class PartSteps:
         if entry is None:
             return f"{told} All steps are not measured like this yet: {AGAIN}." if scan.measured else told
         counts = counts_text(entry["verdicts"])
+        last = LAST if gauge.lower is not None or gauge.upper is not None else MEASURED_LAST
         if self._scan_bar.whole is None:
-            return f"{told} All steps, {LAST}: {counts}."
+            return f"{told} All steps, {last}: {counts}."
         worst = worst_of(entry)
-        return f"Of all {scan.count} steps, {LAST}: {counts}." + (f" Its value is of the {worst}." if worst else "")
+        return f"Of all {scan.count} steps, {last}: {counts}." + (f" Its value is of the {worst}." if worst else "")

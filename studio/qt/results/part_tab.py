@@ -265,7 +265,9 @@ class PartTab(QWidget):
         return of_all or (None if reading is None else judged_over_steps(reading.gauge, [reading]))
 
     def _show_row(self, row: int, gauge: Gauge, entry: dict[str, Any] | None) -> None:
-        texts = [gauge.name, NONE, NONE, NONE, NONE]
+        lasers = self.session.project.scene.lasers
+        of_laser = f" ({lasers[gauge.laser].name})" if len(lasers) > 1 and gauge.laser < len(lasers) else ""
+        texts = [gauge.name + of_laser, NONE, NONE, NONE, NONE]
         tip = f"<p>{TITLES[gauge.kind]}</p>{DEFINITIONS.get(gauge.kind, '')}"
         if entry is not None:
             _, value, sigma, _, _, whole_verdict, error, ratio = cells(entry)

@@ -41,6 +41,8 @@ class ReadoutPanel(QWidget):
         self._session, self._live = session, live(session)
         self.laser = 0
         """Index of the laser that is read out."""
+        self._wanted = 0
+        """The one that was chosen: a new one is selected before the picture of the scene has it."""
         self._lasers = ChoiceBox()
         self._lasers.setToolTip("The laser that the read-outs are of")
         self._lasers.activated.connect(self._choose)
@@ -108,19 +110,19 @@ class ReadoutPanel(QWidget):
 
     def _follow_selection(self) -> None:
         path = self._session.selection
-        if path[:3] == ("scene", "rig", "lasers") and len(path) > 3 and path[3] != self.laser:
-            self.laser = int(path[3])
+        if path[:3] == ("scene", "rig", "lasers") and len(path) > 3 and path[3] != self._wanted:
+            self._wanted = int(path[3])
             self._refresh()
 
     def _choose(self, index: int) -> None:
-        self.laser = index
+        self._wanted = index
         self._session.select(("scene", "rig", "lasers", index))
         self._refresh()
 
     def _refresh(self) -> None:
         look = self._live.look
         names = [laser.name for laser in look.scene.lasers]
-        self.laser = min(self.laser, max(len(names) - 1, 0))
+        self.laser = min(self._wanted, max(len(names) - 1, 0))
         if names != [self._lasers.itemText(i) for i in range(self._lasers.count())]:
             self._lasers.clear()
             self._lasers.addItems(names)

@@ -239,6 +239,7 @@ class SectionTab(QWidget):
         lines = np.concatenate([gap, *(piece for line in made.true for piece in (1e3 * line, gap))])
         self.truth.setData(*lines.T, connect="finite")
         self.dots.setData(*(1e3 * made.measured[:, :2]).T)
+        self.plot.setLabel("bottom", f"{towards('Across', made.plane.axes[0])} / mm")
         self.plot.enableAutoRange()
         part, points = counted(len(made.true), "line"), counted(len(made.measured), "point")
         self.told.setText(f"{part} of the true part, {points} within the slab")
@@ -295,6 +296,15 @@ class SectionTab(QWidget):
         low = room is not None and room.height() < LOW and room.width() >= WIDE
         direction = QBoxLayout.Direction.LeftToRight if low else QBoxLayout.Direction.TopToBottom
         self.column.setDirection(direction)
+
+
+def towards(name: str, axis: Float) -> str:
+    """A plane's own axis by the world's that it runs along, where it does: a section is seen from one of two sides."""
+    along = int(np.argmax(np.abs(axis)))
+    if abs(axis[along]) < 1.0 - 1e-6:
+        return name
+    sign = "+" if axis[along] > 0.0 else "-"
+    return f"{name}, towards {sign}{'xyz'[along]}"
 
 
 def _box(name: str, unit: Unit, low: float, high: float, value: float, decimals: int = 3) -> UnitBox:

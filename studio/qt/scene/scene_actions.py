@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QWidget
 
+from analysis.report.units import counted
 from render.base.errors import InputError
 from render.scene.lights import PointLight, RectangleLight
 from render.scene.motion import LinearStage, NoMotion, PoseList, Turntable
@@ -47,9 +48,11 @@ def remove(session: Session) -> None:
     """Remove all that is selected; a neighbour is selected."""
     if can_change(session):
         paths = _changeable(session)
-        what = _name_of(session, paths)
+        what, measures = _name_of(session, paths), len(session.project.measures)
         if apply(session, f"delete {what}", lambda project: scene_edits.remove_all(project, paths)):
-            session.message.emit("info", f"deleted {what} (Ctrl+Z brings it back)")
+            gone = measures - len(session.project.measures)
+            told = f" and {counted(gone, 'measure')} of what it found" if gone else ""
+            session.message.emit("info", f"deleted {what}{told} (Ctrl+Z brings it back)")
 
 
 def duplicate(session: Session) -> None:

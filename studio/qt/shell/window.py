@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
+from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QResizeEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QWidget
 
 from studio.editing.forms import FieldSpec
@@ -67,8 +67,8 @@ if TYPE_CHECKING:
 
 TALL = ("render", "develop")
 """Panels that scroll."""
-TRIM_MS = 1000
-"""From opening another project until the memory of the former one is given back."""
+TRIM_MS, SETTLING_MS = 1000, 1000
+"""From opening another project until the memory of the former one is given back; from showing to the window's size."""
 
 
 class MainWindow(QMainWindow):
@@ -86,7 +86,7 @@ class MainWindow(QMainWindow):
         self.session = session
         self.preferences = preferences or PreferencesFile()
         session.last_folder = lambda: self.preferences.values.folder
-        self.workspace = ""
+        self.workspace, self._settling = "", False
         self._called: set[str] = set()
         """Panels that no person put where they are."""
         self.setObjectName("main")
@@ -162,8 +162,15 @@ class MainWindow(QMainWindow):
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         if not event.spontaneous():
+            self._settling = True
+            QTimer.singleShot(SETTLING_MS, self, partial(setattr, self, "_settling", False))
             QTimer.singleShot(0, self, self._fit_panels)
             QTimer.singleShot(0, self, self.panels.make_soon)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self._settling:  # the system maximises it once it is shown: panels remembered in that size fit only then
+            QTimer.singleShot(0, self, self._fit_panels)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self.files.may_close(quits=True):

@@ -270,10 +270,10 @@ class StudyPanel(QWidget):
 
 
 def estimate_text(told: Estimate, processors: int) -> str:
-    """ "40 cells of 10 renders, about 2:10 on 2 processors, 0.3 MB", and what to know of figures at its scale."""
+    """ "40 cells of 10 renders to go, about 2:10 on 2 processors, 0.3 MB", and what to know of figures at its scale."""
     if told.cells + told.searched == 0:
         return " ".join(["Every cell is measured.", *told.doubts])
-    parts = [f"{told.cells} cells of {told.renders} renders"]
+    parts = [f"{told.cells} cells of {told.renders} renders to go"]
     if told.steps > 1:
         parts.append(f"step 1 of {told.steps} alone")
     if told.searched:

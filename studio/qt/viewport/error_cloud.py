@@ -186,7 +186,7 @@ class ErrorCloud(QObject):
 
     def _draw_box(self) -> None:
         corners = np.zeros((0, 3))
-        if self.box is not None:
+        if self.box is not None and self.visible:  # without its points it would be about nothing
             ends = np.array([self.box.low, self.box.high]).T
             corners = np.array(np.meshgrid(*ends, indexing="ij")).reshape(3, -1).T
             corners = at_step(corners, self.session.project.scene, self.session.step)
@@ -236,8 +236,8 @@ class ErrorCloud(QObject):
         low, high = self.bar.show_scale(title, unit, scale, self.errors, self.image_scale, limits, self._sides)
         _give(self._data, self.points, scale.colours(self.errors, low, high))
         self._mark()
-        self._draw_box()
         self._show_or_hide()
+        self._draw_box()
 
     @property
     def _sides(self) -> tuple[str, str]:
@@ -282,7 +282,7 @@ class ErrorCloud(QObject):
             actor.SetVisibility(shown)
         self.bar.setVisible(shown)
         if changed:
-            self.view.redraw()
+            self._draw_box()
 
     def _follow_step(self) -> None:
         motion = self.session.project.scene.motion

@@ -148,3 +148,9 @@ def test_a_laser_may_be_called_like_a_kind_of_number(name):
         ("samples a pixel, ambient", "15.5"),
         ("dropped contributions, ambient", "4"),
     ]
+    # of light for the line the error is of the line's position, in sigmas: 0.0122 was told as 1.22 % of the light
+    line = dataclasses.replace(quality[0], error=0.0122, of="line", image_error=0.0021)
+    dark = dataclasses.replace(quality[1], error=0.024, of="line", image_error=None)
+    for_line = [dataclasses.replace(frame, quality=(line, dark, quality[2])) for frame in frames]
+    told = dict(counts(report_of(scene, for_line)))
+    assert told[f"relative error, {name}a"] == "0.21\u00a0%" and f"relative error of reflections, {name}a" not in told

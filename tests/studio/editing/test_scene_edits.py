@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from analysis.gauges.gauge import Gauge
 from render.base.errors import InputError
 from render.base.pose import invert
 from render.material.conductor import Conductor
@@ -157,6 +158,25 @@ class TestLists:
         assert path == (*OBJECTS, 1)
         assert made.scene.objects == project.scene.objects[::-1]
         assert scene_edits.move(project, (*OBJECTS, 1), 99)[0] == project
+
+    def test_measures_follow_their_laser_and_go_with_it(self, project: Project) -> None:
+        """Of a rig whose first laser was deleted its measures read the second one's line, under their old names."""
+        two, first = scene_edits.add_laser(project)[0], (*LASERS, 0)
+        measures = tuple(
+            Gauge(name=f"of {laser}", kind="angle", laser=laser, regions=((-0.1, 0.0), (0.0, 0.1))) for laser in (0, 1)
+        )
+        two = two.model_copy(update={"measures": measures})
+
+        def left(changed: Project) -> list[tuple[str, int]]:
+            return [(gauge.name, gauge.laser) for gauge in changed.measures]
+
+        assert left(scene_edits.remove(two, first)[0]) == [("of 1", 0)]
+        assert left(scene_edits.remove(two, (*LASERS, 1))[0]) == [("of 0", 0)]
+        assert left(scene_edits.move(two, first, 1)[0]) == [("of 0", 1), ("of 1", 0)]
+        copied, at = scene_edits.duplicate(two, first)
+        assert left(copied) == [("of 0", 0), ("of 1", 2)] and at == (*LASERS, 1)
+        assert [laser.name for laser in copied.scene.lasers][::2] == [laser.name for laser in two.scene.lasers]
+        assert left(scene_edits.remove_all(copied, [first, at])[0]) == [("of 1", 0)]
 
     def test_a_taken_name_is_refused_in_words(self, project: Project) -> None:
         first, second = (item.name for item in project.scene.objects)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject
-from PySide6.QtWidgets import QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QLabel, QMainWindow, QPushButton, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
+from studio.qt.core.boxes import DecimalBox
 from studio.qt.core.widgets import Scrolled, ShareBar, bring_into_view
 
 
@@ -62,3 +64,28 @@ def test_a_bar_is_drawn_with_all_else_that_changes(qtbot: QtBot) -> None:
     assert bar.maximum() == 0, "to and fro"
     bar.show_none()
     assert (bar.maximum(), bar.value()) == (1000, 0)
+
+
+def test_undo_is_the_window_s_unless_a_number_is_being_typed(qtbot: QtBot) -> None:
+    """Three times Ctrl+Z with the focus in Exposure undid nothing."""
+    window, undone = QMainWindow(), []
+    box = DecimalBox(maximum=100.0)
+    window.setCentralWidget(box)
+    undo = QAction("Undo", window)
+    undo.setShortcut(QKeySequence.StandardKey.Undo)
+    undo.triggered.connect(lambda: undone.append(box.value()))
+    window.addAction(undo)
+    qtbot.addWidget(window)
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    box.setFocus()
+    box.selectAll()
+    qtbot.keyClicks(box, "4")
+    qtbot.keyClick(box, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert not undone, "what is typed is taken back letter by letter"
+    box.selectAll()
+    qtbot.keyClicks(box, "5")
+    qtbot.keyClick(box, Qt.Key.Key_Return)
+    qtbot.keyClick(box, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert undone == [5.0] and box.value() == 5.0

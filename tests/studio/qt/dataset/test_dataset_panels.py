@@ -9,6 +9,7 @@ import pytest
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
+from render.base.errors import InputError
 from studio.dataset.recipe import Draw, Recipe, ready_made
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
@@ -19,7 +20,8 @@ from studio.qt.dataset.draw_row import DrawRow
 from studio.qt.dataset.recipe_panel import RecipePanel
 from studio.runtime.workers import Engine
 from studio.study.draft import spec_of
-from studio.study.study import parts_of
+from studio.study.study import Study, parts_of
+from studio.study.study_file import write_study
 from tests.studio.qt.small_session import small_session
 
 SMALL = Recipe(
@@ -167,6 +169,21 @@ def test_a_saved_recipe_is_what_was_shown(desk: Desk, tmp_path: Path) -> None:
     assert desk.work.save(file)
     assert Recipe.load(file)[0] == desk.work.recipe
     assert (desk.work.recipe.images, desk.work.recipe.draw[0].high) == (5, 0.2)
+
+
+def test_a_recipe_or_a_study_never_replaces_a_project(desk: Desk, tmp_path: Path) -> None:
+    """Groove the recipe and groove the project had one name in one folder, and the project was gone."""
+    file = tmp_path / "groove.json"
+    desk.session.document.save(file)
+    text = file.read_text()
+    assert not desk.work.save(file)
+    assert "would replace a project" in desk.work.problem and file.read_text() == text
+    desk.work.begin_with_project()
+    assert not desk.work.save(file) and file.read_text() == text
+    sweep = {"name": "power", "vary": [{"field": "scene.rig.lasers[0].power", "values": [0.01]}]}
+    with pytest.raises(InputError, match="the study would replace a project"):
+        write_study(file, Study.model_validate({"base": "plane", "sweeps": [sweep]}), desk.session.document, {})
+    assert file.read_text() == text
 
 
 def test_the_open_project_becomes_a_recipe_field_by_field(desk: Desk, qtbot: QtBot, tmp_path: Path) -> None:

@@ -67,6 +67,11 @@ def test_with_two_lasers_the_selected_one_is_read_out(qtbot: QtBot) -> None:
     assert value_of(panel, "baseline") == "350 mm" and choice.currentText() == "second"
     session.set(LASERS, (first,))
     qtbot.waitUntil(lambda: value_of(panel, "baseline") == "200 mm")
+    # a new one is selected before anything of it is there to be read out
+    session.select((*LASERS, 0))
+    session.set(LASERS, (first, other))
+    session.select((*LASERS, 1))
+    qtbot.waitUntil(lambda: value_of(panel, "baseline") == "350 mm")
 
 
 def test_without_a_laser_it_says_what_to_do(qtbot: QtBot) -> None:

@@ -69,7 +69,7 @@ class TestDraft:
         assert desk.work.estimate.renders == 2 and desk.work.estimate.seconds is None
         qtbot.mouseClick(desk.panel.time, Qt.MouseButton.LeftButton)
         qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.seconds is not None)
-        assert "12 cells of 2 renders, about" in desk.panel.told.text()
+        assert "12 cells of 2 renders to go, about" in desk.panel.told.text()
 
     def test_a_study_that_nobody_has_begun_is_no_fault(self, desk: Desk) -> None:
         desk.work.look_ahead()
