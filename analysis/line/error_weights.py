@@ -67,28 +67,31 @@ def _put(
     for y in range(n):
         variance, count = 0.0, 0
         for i in range(w):
-            decided[i] = False
-        for i in range(w):
-            if move[y, i] != 0.0:
-                variance += move[y, i] * move[y, i] * (light[y, i] + floor)
-                if narrow[y]:
-                    # one more on either side, as windows begin with the pixel
-                    decided[max(i - 1, 0) : i + 2] = True
-        for i in range(w):
+            # one more on either side, as windows begin with the pixel
+            decided[i] = move[y, i] != 0.0 or _beside(move[y], i) != 0.0
             count += decided[i]
+            variance += move[y, i] * move[y, i] * (light[y, i] + floor)
         # a line that is moved by more than it tells asks of no light to be known better than its pixels' noise
         sigma = max(told[y], np.sqrt(variance))
         scale = np.float32(1.0 / (allowed * max(sigma, least[y]))) if 0.0 < sigma < np.inf else np.float32(0.0)
         share = 1.0 / (of_pixel * np.sqrt(max(count, 1)))
         for i in range(w):
             even = risen[y, i] * evenly
-            if decided[i]:
+            if narrow[y] and decided[i]:
                 even = max(even, share / np.sqrt(max(light[y, i] + floor, 1e-2)))
             by_laser = illumination[y, i] * np.float32(response[y & 1, i & 1])
             by_band = illumination[y, i] * np.float32(bands[y & 1, i & 1])
             peaks[y, i] = risen[y, i] * by_laser
             ambient[y, i] = max(ambient[y, i], even * by_band)
-            if move[y, i] != 0.0:
-                moved = move[y, i] * scale
+            if decided[i]:
+                moved = (move[y, i] if move[y, i] != 0.0 else _beside(move[y], i)) * scale
                 laser[y, i] = moved * by_laser
                 moves[y, i] = moved * by_band
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _beside(move: Float32, i: int) -> float:
+    """Of pixel i in those of a scan line (w,): how far the one beside it moves the line, if either does."""
+    if i + 1 < len(move) and move[i + 1] != 0.0:
+        return float(move[i + 1])
+    return float(move[i - 1]) if i > 0 else 0.0

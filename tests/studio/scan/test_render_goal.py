@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from analysis.line.result import Line
+from analysis.line.result import Flag, Line
 from render.frame import Frame
 from render.laser_indirect.integrator import Aim, indirect_images
 from render.render import render_world
 from render.run import Run
 from render.scene.settings import DepthGoal
-from render.sensor.develop import expected_electrons
+from render.sensor.develop import develop, expected_electrons
 from render.sensor.response import relative_illumination
 from render.world.placed import PlacedScene
 from render.world.world import World, build_world
@@ -96,6 +97,41 @@ def test_ambient_light_is_known_to_a_share_of_the_noise_of_every_pixel_of_the_li
         columns = int(round(line.u[row, 0])) + np.arange(-3, 4)
         allowed = of_radiance[row, columns] / (weight[row, columns] * np.sqrt(electrons[row, columns] + 49.0))
         assert (allowed <= 0.3 * np.sqrt(13.0) * 1.01).all()
+
+
+def test_the_pixel_beside_a_lines_window_is_known_as_the_last_one_in_it(world: World) -> None:
+    """The image's own noise sets the window, by a pixel more or less: what is unknown beside it would be a misfit."""
+    sheet = project_of().scene.lasers[0].sheet
+    wide = project_of(transport="direct").replaced({"scene.rig.lasers[0].sheet.full_angle": 4.0 * sheet.full_angle})
+    frame = rendered(wide, world)
+    weight, line = importance(wide, DepthGoal(depth=0.1), frame, 2).laser[0], line_in(wide, frame)
+    rows = np.flatnonzero(line.valid[:, 0] & (line.flag[:, 0] == 0))
+    assert len(rows) > 50
+    for row in rows:
+        weighed = np.flatnonzero(weight[row])
+        assert len(weighed) >= 9 and np.array_equal(weighed, np.arange(weighed[0], weighed[-1] + 1))
+        middle = int(round(line.u[row, 0]))
+        assert weighed[0] < middle - 3 and weighed[-1] > middle + 3
+        ends = weighed[[0, -1]], weighed[[1, -2]]
+        assert weight[row, ends[0]] == pytest.approx(weight[row, ends[1]], rel=0.05)
+
+
+def test_no_row_is_two_lines_by_the_noise_of_reflected_light_alone() -> None:
+    """A narrow line down a groove, seen and lit from farther aside: beside it one path of light in a hundred pixels
+    carries as much as the sensor's noise in each."""
+    groove = Project.load("v_groove")
+    data = json.loads(groove.replaced({"sensor.exposure_time": 0.00222}).to_text())
+    rig = data["scene"]["rig"]
+    rig["camera"]["T_rig_camera"]["translation"] = [-0.02, 0.0, 0.0]
+    rig["lasers"][0]["T_rig_laser"] = {"translation": [-0.24, 0.0, 0.0], "rotation": [0.0, 0.226893, 0.0]}
+    rig["lasers"][0]["sheet"] = {"kind": "divergence", "full_angle": 0.00115}
+    rig["lasers"][0]["fan_angle"] = 0.7853981633974483
+    turned = scaled(Project.from_data(data, "groove").in_folder(groove.folder), 0.5)
+    frame = rendered(turned, build_world(turned.scene, turned.folder, 0))
+    for seed in range(3):
+        image = develop(frame, turned.scene, turned.sensor, seed=seed)
+        flag = extract_line(turned, image, 0, 2).flag[:, 0]
+        assert np.count_nonzero(flag == Flag.OK) > 590 and np.isin(flag, (Flag.BLENDED, Flag.MISFIT)).sum() <= 1
 
 
 def test_a_line_that_is_not_the_lasers_is_known_to_a_share_of_its_width(frame: Frame) -> None:
