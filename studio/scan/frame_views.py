@@ -141,6 +141,20 @@ def at_pixel(scene: Scene, frame: Frame, images: list[Image], row: int, column: 
     return rows
 
 
+def at_live_pixel(scene: Scene, image: PreviewImage, row: int, column: int) -> list[tuple[str, str]]:
+    """As `at_pixel`, of a preview of the scene; row and column are the camera's own."""
+    i = min(int((row + 0.5) * image.scale), image.depth_z.shape[0] - 1)
+    j = min(int((column + 0.5) * image.scale), image.depth_z.shape[1] - 1)
+    rows = [("u, v", f"{column}, {row}")]
+    for laser, light in zip(scene.lasers, image.laser, strict=True):
+        rows.append((laser.name, f"about {light[i, j]:.3g} W/(m² sr)"))
+    item = int(image.object_id[i, j])
+    if item >= 0:
+        rows.append(("depth", f"{1e3 * float(image.depth_z[i, j]):.2f} mm"))
+        rows.append(("object", scene.visible_objects[item].name))
+    return rows
+
+
 def live_picture(project: Project, image: PreviewImage, paint: bool = False) -> Picture:
     """(h, w) a preview: grey shape for the eye, and each laser's line as bright as the sensor would see it.
 

@@ -21,6 +21,7 @@ from render.output.tone_mapping import Picture, pyramid
 from studio.qt.core import theme
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.jobs import JobRunner
+from studio.qt.core.laser_box import laser_of
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import flush, upper_and_lower
@@ -31,7 +32,7 @@ from studio.qt.image.row_profile import RowProfile
 from studio.qt.image.scan_line_marks import ScanLineMarks
 from studio.qt.image.zooms import Zooms
 from studio.runtime.jobs import Progress
-from studio.scan.frame_views import SATURATED, at_pixel, live_picture, picture, views
+from studio.scan.frame_views import SATURATED, View, at_live_pixel, at_pixel, live_picture, picture, views
 
 DRAG_SECONDS, REST_SECONDS = 0.016, 0.08
 """Of work for a live picture: while something is dragged, and when it has come to rest."""
@@ -44,6 +45,8 @@ MARGIN_PX, SPACE_PX = 6, 8
 LEAST_HEIGHT = 260
 """px, from which names of lines may have a row of their own."""
 SATURATED_NAME = "Saturated"
+OF_A_LASER = ("image", "laser", "reflected")
+"""Kinds of views that each laser has."""
 LIVE = "Live estimate"
 OF_A_CELL = "Not of the project: the picture is of a study's cell, with values of its own."
 
@@ -157,6 +160,7 @@ class CameraView(QWidget):
         session.developed.connect(self._developed)
         session.measured.connect(self._draw_overlay)
         session.hover_changed.connect(self._hover_changed)
+        session.selection_changed.connect(self._follow_selection)
         session.document_replaced.connect(lambda: self._read_out(None))
         self.live.changed.connect(self._live_changed)
         self.live.loading.connect(lambda on: self._show_badge())
@@ -226,10 +230,24 @@ class CameraView(QWidget):
         self._show_badge()
         self.refresh()
 
+    def _follow_selection(self) -> None:
+        """What is seen of one laser is seen of another that is selected."""
+        laser, view = laser_of(self.session.selection), self.choice.itemData(self._chosen)
+        if laser is None or not isinstance(view, View) or view.kind not in OF_A_LASER or view.laser == laser:
+            return
+        for i in range(1, self.choice.count()):
+            one = self.choice.itemData(i)
+            if (one.kind, one.laser) == (view.kind, laser):
+                self._chosen = i
+                self._fill_choice()
+                self._profile_of_view()
+                self.refresh()
+                return
+
     def _profile_of_view(self) -> None:
         """The row profile is of the laser that is looked at."""
         view = self.choice.itemData(self._chosen)
-        self.profile.show_laser(view.laser if view is not None and view.kind in ("image", "laser") else 0)
+        self.profile.show_laser(view.laser if view is not None and view.kind in OF_A_LASER else 0)
 
     def _show_badge(self) -> None:
         shown = self.session.shown
@@ -369,25 +387,11 @@ class CameraView(QWidget):
             return
         (column, row), shown = cursor, self.session.shown
         if self.is_live or shown is None:
-            self.readout.setText(readout_text(self._live_values(row, column)))
+            look = self.live.look
+            image = look.image(seconds=DRAG_SECONDS if self.session.dragging else REST_SECONDS)
+            self.readout.setText(readout_text(at_live_pixel(look.scene, image, row, column)))
         else:
             self.readout.setText(readout_text(at_pixel(shown.project.scene, shown.frame, shown.images, row, column)))
-
-    def _live_values(self, row: int, column: int) -> list[tuple[str, str]]:
-        look = self.live.look
-        image = look.image(seconds=DRAG_SECONDS if self.session.dragging else REST_SECONDS)
-        i = min(int((row + 0.5) * image.scale), image.depth_z.shape[0] - 1)
-        j = min(int((column + 0.5) * image.scale), image.depth_z.shape[1] - 1)
-        told = [("u, v", f"{column}, {row}")]
-        item = int(image.object_id[i, j])
-        told += [
-            (laser.name, f"about {light[i, j]:.3g} W/(m² sr)")
-            for laser, light in zip(look.scene.lasers, image.laser, strict=True)
-        ]
-        if item >= 0:
-            told.append(("depth", f"{1e3 * float(image.depth_z[i, j]):.2f} mm"))
-            told.append(("object", look.scene.visible_objects[item].name))
-        return told
 
 
 def readout_text(values: list[tuple[str, str]]) -> str:

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 from studio.preview.readout_rows import Row, rows
 from studio.preview.readouts import readouts
 from studio.qt.core import theme
-from studio.qt.core.boxes import ChoiceBox
+from studio.qt.core.laser_box import LaserBox
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import ElidedLabel
@@ -39,13 +39,8 @@ class ReadoutPanel(QWidget):
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session, self._live = session, live(session)
-        self.laser = 0
-        """Index of the laser that is read out."""
-        self._wanted = 0
-        """The one that was chosen: a new one is selected before the picture of the scene has it."""
-        self._lasers = ChoiceBox()
+        self._lasers = LaserBox(session)
         self._lasers.setToolTip("The laser that the read-outs are of")
-        self._lasers.activated.connect(self._choose)
         self._hint = QLabel("Add a laser to the rig to see what it measures.", wordWrap=True)
         self.problem = QLabel("Not of the scene as it is set: the scene tree marks what cannot be.", wordWrap=True)
         self.problem.setObjectName("warning")
@@ -82,7 +77,7 @@ class ReadoutPanel(QWidget):
             label.setContentsMargins(10, 6, 10, 0)
         self._live.changed.connect(self._refresh)
         session.problems_changed.connect(self._refresh)
-        session.selection_changed.connect(self._follow_selection)
+        self._lasers.chosen.connect(self._refresh)
         theme.notice.changed.connect(self._paint)
         self.fixes.changed.connect(self._offer_fixes)
         self._rows: tuple[Row, ...] = ()
@@ -108,26 +103,15 @@ class ReadoutPanel(QWidget):
         """What is shown."""
         return self._rows
 
-    def _follow_selection(self) -> None:
-        path = self._session.selection
-        if path[:3] == ("scene", "rig", "lasers") and len(path) > 3 and path[3] != self._wanted:
-            self._wanted = int(path[3])
-            self._refresh()
-
-    def _choose(self, index: int) -> None:
-        self._wanted = index
-        self._session.select(("scene", "rig", "lasers", index))
-        self._refresh()
+    @property
+    def laser(self) -> int:
+        """Index of the laser that is read out."""
+        return self._lasers.laser
 
     def _refresh(self) -> None:
         look = self._live.look
         names = [laser.name for laser in look.scene.lasers]
-        self.laser = min(self._wanted, max(len(names) - 1, 0))
-        if names != [self._lasers.itemText(i) for i in range(self._lasers.count())]:
-            self._lasers.clear()
-            self._lasers.addItems(names)
-        self._lasers.setCurrentIndex(self.laser if names else -1)
-        self._lasers.setVisible(len(names) > 1)
+        self._lasers.show_names(names)
         self._hint.setVisible(not names)
         self.problem.setVisible(bool(names and self._session.problems))
         self._area.setVisible(bool(names))

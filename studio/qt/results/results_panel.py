@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import partial
 from html import escape
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QCloseEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QFrame,
@@ -29,6 +29,7 @@ from studio.qt.core import theme
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.icons import dot
+from studio.qt.core.laser_box import LaserBox
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session, one_of
 from studio.qt.results.heads import heads, measured_otherwise
@@ -75,7 +76,8 @@ class ResultsPanel(QWidget):
         self.scan_lines: tuple[str, int, int] | None = None
         self.hidden: set[str] = set()
         """Methods that are switched off."""
-        self.laser = ChoiceBox()
+        self.laser = LaserBox(session)
+        self.laser.setToolTip("The laser that points, errors and measures are of")
         self.error = ChoiceBox()
         self.error.addItems([view.title for view in ERROR_VIEWS])
         self.error.setToolTip(
@@ -99,7 +101,7 @@ class ResultsPanel(QWidget):
         self.notices = Remarks(), Remarks()
         """What a reader should notice: below the measures, and in a tab where there is no room below them."""
         self._lay_out()
-        self.laser.currentIndexChanged.connect(self.refresh)
+        self.laser.chosen.connect(self.refresh)
         self.error.currentIndexChanged.connect(self.refresh)
         self.error.currentIndexChanged.connect(lambda _: self.view_changed.emit(self.view))
         for plot in (self.rows, self.profile):
@@ -140,7 +142,7 @@ class ResultsPanel(QWidget):
 
     def shown(self) -> dict[str, Measurement]:
         """Measurements of the chosen laser by the methods that are switched on."""
-        render, laser = self.session.shown, max(0, self.laser.currentIndex())
+        render, laser = self.session.shown, self.laser.laser
         if render is None:
             return {}
         found = {method: each[laser] for method, each in render.measurements.items() if laser < len(each)}
@@ -148,7 +150,7 @@ class ResultsPanel(QWidget):
 
     def refresh(self) -> None:
         """Draw everything anew."""
-        render, laser = self.session.shown, max(0, self.laser.currentIndex())
+        render, laser = self.session.shown, self.laser.laser
         self._drawn = self._inputs()
         self._make_switches()
         have = render is not None and laser < len(render.frame.curves)
@@ -245,11 +247,7 @@ class ResultsPanel(QWidget):
     def _another_render(self) -> None:
         render = self.session.shown
         names = [] if render is None else [laser.name for laser in render.project.scene.lasers]
-        if names != [self.laser.itemText(i) for i in range(self.laser.count())]:
-            with QSignalBlocker(self.laser):
-                self.laser.clear()
-                self.laser.addItems(names)
-        self.laser.setVisible(len(names) > 1)
+        self.laser.show_names(names)
         before, self.scan_lines = self.scan_lines, None if render is None else render.scan_lines
         if self.scan_lines != before:
             self.pinned = None
