@@ -173,7 +173,8 @@ def _saturation(r: Readouts) -> Row:
         return Row("saturated", "Saturated", NOTHING, "", "", help)
     level: Level = "error" if r.saturated > MUCH_SATURATED else "warning" if r.saturated > 0.01 else ""
     full = r.peak_electrons.high / r.full_well
-    return Row("saturated", "Saturated", f"{r.saturated:.0%}", f"{full:.0%} of full well", level, help)
+    alone = " without speckle" if r.speckled else ""
+    return Row("saturated", "Saturated", f"{r.saturated:.0%}", f"{full:.0%} of full well{alone}", level, help)
 
 
 def _focus(r: Readouts) -> Row:

@@ -151,6 +151,9 @@ def test_depth_noise_is_that_of_the_sensor_as_it_is_set() -> None:
     assert off.depth_sigma == off.photon_sigma == on.photon_sigma
     assert on.depth_sigma == pytest.approx(math.hypot(on.photon_sigma, on.speckle_sigma))
     assert told_off.note == f"with speckle {told_on.value.removesuffix(' µm')}"
+    # a share that saturates by speckle is beside a peak that none is in
+    full_off, full_on = (next(row for row in rows(r) if row.key == "saturated").note for r in (off, on))
+    assert full_on == f"{full_off} without speckle" and full_off.endswith("% of full well")
     assert "switch it on" in told_off.help.lower() and "switch it on" not in told_on.help.lower()
 
 
