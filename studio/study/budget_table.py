@@ -71,6 +71,7 @@ def _sentences(found: ErrorBudget) -> Iterator[str]:
     )
     if found.wrong_rows > 0.0:
         yield f"{found.wrong_rows:.2%} of the rows are measured wrong, by more than a pixel, and left out of all this."
+    yield "Rows at the ends of the line, which light covers in part, are left out of it too."
     yield (
         f"Effects that meet make {found.variance.interaction.mean / total:+.0%} of the variance, "
         f"half of which counts for each."

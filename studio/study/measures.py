@@ -14,6 +14,11 @@ from analysis.line.result import Flag, Line, positioned
 from analysis.triangulate import Points
 from render.frame import LaserCurve
 
+BROKEN = 8.0
+"""px along the scan line, from one to the next: a line that goes on is not as steep but at the rim of a round part."""
+APART = 1e6
+"""px, that scan lines are laid end to end by."""
+
 
 @dataclass(frozen=True)
 class Measure:
@@ -30,8 +35,10 @@ MEASURES: dict[str, Measure] = {
     "depth_bias": Measure("depth bias", "µm", 1e6, signed=True),
     "depth_sigma": Measure("depth sigma", "µm", 1e6),
     "depth_robust_sigma": Measure("depth sigma, robust", "µm", 1e6),
-    "depth_bias_right": Measure("depth bias of the rows measured right", "µm", 1e6, signed=True),
-    "depth_sigma_right": Measure("depth sigma of the rows measured right", "µm", 1e6),
+    "depth_bias_right": Measure(
+        "depth bias of the rows measured right, but for the line's ends", "µm", 1e6, signed=True
+    ),
+    "depth_sigma_right": Measure("depth sigma of the rows measured right, but for the line's ends", "µm", 1e6),
     "depth_p95": Measure("depth error, 95 % below", "µm", 1e6),
     "depth_predicted_sigma": Measure("predicted depth sigma, median", "µm", 1e6),
     "depth_coverage": Measure("depth errors within 2 predicted sigma", "%", 100.0),
@@ -114,7 +121,8 @@ def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> d
     visible = max(errors.truth_rows, 1)
     wrong = np.unique(points.index[errors.outlier]).size
     found = line.valid
-    right = errors.depth[np.isfinite(errors.depth) & ~errors.outlier]
+    whole = ~np.append(at_end(curve), False)[errors.truth]  # the last is of points without truth
+    right = errors.depth[np.isfinite(errors.depth) & ~errors.outlier & whole]
     return {
         "depth_rmse": errors.depth_z.rmse,
         "depth_bias": errors.depth_z.bias,
@@ -144,6 +152,20 @@ def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> d
         "depth_per_pixel": _median(np.abs(points.gradient[points.valid, 2])),
         "incidence": _median(np.maximum(curve.laser_angle, curve.camera_angle)),
     }
+
+
+def at_end(curve: LaserCurve) -> np.ndarray:
+    """(n,) of the exact line's crossings: whether the line ends or breaks there, by more than BROKEN.
+
+    Its light covers such a scan line in part, and is measured where that part is: of a sphere the two rows at its rim
+    make more of the variance than all others.
+    """
+    key, ends = curve.index * APART + curve.position, np.zeros(len(curve.index), np.bool_)
+    ordered = np.concatenate([[-np.inf], np.sort(key), [np.inf]])
+    for beside in (key - APART, key + APART):
+        after = np.searchsorted(ordered, beside)
+        ends |= np.minimum(ordered[after] - beside, beside - ordered[after - 1]) > BROKEN
+    return ends
 
 
 def _median(values: np.ndarray) -> float:
