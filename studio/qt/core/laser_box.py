@@ -30,7 +30,7 @@ class LaserBox(ChoiceBox):
         self.setVisible(False)
         self.activated.connect(self._choose)
         session.selection_changed.connect(self._follow)
-        session.document_replaced.connect(lambda: self._take(0))
+        session.document_replaced.connect(self._begin_anew)
 
     @property
     def laser(self) -> int:
@@ -50,6 +50,9 @@ class LaserBox(ChoiceBox):
         selected = laser_of(self._session.selection)
         if selected is not None and selected != self._wanted:
             self._take(selected)
+
+    def _begin_anew(self) -> None:
+        self._take(0)
 
     def _choose(self, index: int) -> None:
         if index < len(self._session.project.scene.lasers):
