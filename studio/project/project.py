@@ -25,6 +25,7 @@ from render.sensor.sensor import Sensor
 from studio.project.calibration import Calibration, from_file_data, read_calibration_file
 from studio.project.found_motion import motion_fault
 from studio.project.migrations import migrate
+from studio.project.same_lasers import of_same_lasers
 from studio.project.strict_json import parse_object, pretty, read_object
 from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.project.validation_messages import input_error
@@ -180,8 +181,10 @@ class Project(Model):
         return self.from_data(data, "replaced").in_folder(self.folder)
 
     def read_as(self, other: Self) -> Self:
-        """The same project, with what `other` reads off what was measured: measures of the part, and the report."""
-        return self.model_copy(update={name: getattr(other, name) for name in READ_OFF})
+        """The same project, with what `other` reads off what was measured: measures of the part, each of the same laser
+        as there, and the report."""
+        own = of_same_lasers(other.measures, other.scene, self.scene)
+        return self.model_copy(update={**{name: getattr(other, name) for name in READ_OFF}, "measures": own})
 
     def to_text(self) -> str:
         """The file's text: every value written out, so that a project outlives a change of defaults."""

@@ -21,6 +21,8 @@ from studio.scan.stages import scaled
 DEPTH_MAP = "viridis"
 SHAPE_BRIGHTNESS = 0.45
 """Of what a live picture shows beside the line."""
+OF_A_LASER = ("image", "laser", "reflected")
+"""Kinds of views that each laser has."""
 SATURATED = "#ff2d78"
 """Of pixels that are painted as saturated: no light and no theme has this colour."""
 

@@ -17,6 +17,7 @@ from render.scene.shape import MeshFile
 from render.sensor.develop import Image, develop
 from render.world.world import World
 from studio.project.project import Project
+from studio.project.same_lasers import same_lasers
 from studio.scan.exposure import expose
 from studio.scan.stages import Clock, Measurement, measure_step, scaled
 
@@ -101,13 +102,12 @@ def development(rendered: Project, now: Project, image_scale: float = 1.0) -> De
         "sensor": now.sensor,
         "extraction": extraction,
         "seed": now.seed,
-        "measures": tuple(one for one in now.measures if one.laser < len(scene.lasers)),
     }
     if len(now.scene.lasers) == len(scene.lasers) and _size(now.scene) == _size(scene):
         update["calibration"] = now.calibration
-    powers = [laser.power for laser in now.scene.lasers]
-    if len(powers) != len(scene.lasers):
-        powers = [laser.power for laser in scene.lasers]
+    powers = [laser.power for laser in scene.lasers]
+    for i, its in same_lasers(now.scene, scene).items():
+        powers[its] = now.scene.lasers[i].power
     allowed = [
         power if laser.power > 0.0 else 0.0 for power, laser in zip(powers, scene.lasers, strict=True)
     ]  # a laser that was off left no light

@@ -17,7 +17,10 @@ def laser_of(path: FieldPath) -> int | None:
 
 
 class LaserBox(ChoiceBox):
-    """One of several lasers, hidden where there are fewer; choosing it selects it everywhere."""
+    """One of several lasers, hidden where there are fewer; choosing it selects it everywhere.
+
+    Those of a render may be others than the project has now: they are known by name.
+    """
 
     chosen = Signal()
     """`laser` may be another."""
@@ -25,41 +28,44 @@ class LaserBox(ChoiceBox):
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self._wanted = 0
-        """The one that was selected: a new one is before panels have it."""
+        self._wanted = ""
+        """The name of the one that was selected: a new one is before panels have it."""
         self.setVisible(False)
         self.activated.connect(self._choose)
         session.selection_changed.connect(self._follow)
-        session.document_replaced.connect(self._begin_anew)
 
     @property
     def laser(self) -> int:
         """Its index, 0 where there is none."""
-        return max(0, min(self._wanted, self.count() - 1))
+        return max(0, self.currentIndex())
 
     def show_names(self, names: list[str]) -> None:
         """Of the lasers that there are."""
+        before = self.laser
         if names != [self.itemText(i) for i in range(self.count())]:
             with QSignalBlocker(self):
                 self.clear()
                 self.addItems(names)
-        self.setCurrentIndex(self.laser if names else -1)
+        self.setCurrentIndex(names.index(self._wanted) if self._wanted in names else min(before, len(names) - 1))
         self.setVisible(len(names) > 1)
 
     def _follow(self) -> None:
-        selected = laser_of(self._session.selection)
-        if selected is not None and selected != self._wanted:
-            self._take(selected)
-
-    def _begin_anew(self) -> None:
-        self._take(0)
+        selected, lasers = laser_of(self._session.selection), self._session.project.scene.lasers
+        if selected is not None and selected < len(lasers):
+            self._take(lasers[selected].name)
 
     def _choose(self, index: int) -> None:
-        if index < len(self._session.project.scene.lasers):
-            self._session.select((*LASERS, index))
-        self._take(index)
+        name = self.itemText(index)
+        names = [laser.name for laser in self._session.project.scene.lasers]
+        if name in names:
+            self._session.select((*LASERS, names.index(name)))
+        self._take(name)
 
-    def _take(self, index: int) -> None:
-        self._wanted = index
-        self.setCurrentIndex(self.laser)
-        self.chosen.emit()
+    def _take(self, name: str) -> None:
+        if name == self._wanted:
+            return
+        self._wanted = name
+        index = self.findText(name)
+        if index >= 0:
+            self.setCurrentIndex(index)
+            self.chosen.emit()

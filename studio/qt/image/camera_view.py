@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from render.base.threads import Cancel
 from render.output.tone_mapping import Picture, pyramid
+from studio.project.same_lasers import same_lasers
 from studio.qt.core import theme
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.jobs import JobRunner
@@ -32,7 +33,7 @@ from studio.qt.image.row_profile import RowProfile
 from studio.qt.image.scan_line_marks import ScanLineMarks
 from studio.qt.image.zooms import Zooms
 from studio.runtime.jobs import Progress
-from studio.scan.frame_views import SATURATED, View, at_live_pixel, at_pixel, live_picture, picture, views
+from studio.scan.frame_views import OF_A_LASER, SATURATED, View, at_live_pixel, at_pixel, live_picture, picture, views
 
 DRAG_SECONDS, REST_SECONDS = 0.016, 0.08
 """Of work for a live picture: while something is dragged, and when it has come to rest."""
@@ -45,8 +46,6 @@ MARGIN_PX, SPACE_PX = 6, 8
 LEAST_HEIGHT = 260
 """px, from which names of lines may have a row of their own."""
 SATURATED_NAME = "Saturated"
-OF_A_LASER = ("image", "laser", "reflected")
-"""Kinds of views that each laser has."""
 LIVE = "Live estimate"
 OF_A_CELL = "Not of the project: the picture is of a study's cell, with values of its own."
 
@@ -232,12 +231,14 @@ class CameraView(QWidget):
 
     def _follow_selection(self) -> None:
         """What is seen of one laser is seen of another that is selected."""
-        laser, view = laser_of(self.session.selection), self.choice.itemData(self._chosen)
-        if laser is None or not isinstance(view, View) or view.kind not in OF_A_LASER or view.laser == laser:
+        shown, selected = self.session.shown, laser_of(self.session.selection)
+        view = self.choice.itemData(self._chosen)
+        if shown is None or selected is None or not isinstance(view, View) or view.kind not in OF_A_LASER:
             return
+        laser = same_lasers(self.session.project.scene, shown.project.scene).get(selected, view.laser)
         for i in range(1, self.choice.count()):
             one = self.choice.itemData(i)
-            if (one.kind, one.laser) == (view.kind, laser):
+            if laser != view.laser and (one.kind, one.laser) == (view.kind, laser):
                 self._chosen = i
                 self._fill_choice()
                 self._profile_of_view()

@@ -24,6 +24,7 @@ from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
 from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, value_text, verdict_text
 from analysis.report.units import NONE
+from studio.project.same_lasers import same_lasers
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.session import Session
@@ -68,7 +69,10 @@ class PartTab(QWidget):
         self._entries: tuple[dict[str, Any] | None, ...] = ()
         """Rows of the table, each as a scan's report would have it."""
         self._placed: list[tuple[float, float]] = []
+        self._measures: tuple[Gauge, ...] = ()
+        """The project's."""
         self._read: tuple[Gauge, ...] = ()
+        """The same, each of its laser as the shown render has it."""
         self.drawing = PartDrawing(profile.plot, self)
         self.table = ReadOnlyTable()
         DeleteKey(self.table, self.delete)
@@ -112,7 +116,7 @@ class PartTab(QWidget):
         self._profiles = {}
         if render is not None and render.measurements:
             found = best(render.measurements, render.developed_by(self.session.project))
-            used = {laser, *(gauge.laser for gauge in self.session.project.measures)}
+            used = {laser, *(gauge.laser for gauge in self._as_rendered())}
             self._profiles = {
                 i: profiles(render.project, render.frame, one, self.session.project.measured_in)
                 for i, one in enumerate(found)
@@ -123,7 +127,7 @@ class PartTab(QWidget):
     def refresh(self) -> None:
         """Read and show all measures anew."""
         render = self.session.shown
-        self._read = self.session.project.measures
+        self._measures, self._read = self.session.project.measures, self._as_rendered()
         self.section.setCurrentIndex(self.section.findData(self.session.project.measured_in))
         self.chosen = min(self.chosen, len(self._read) - 1)
         step = 0 if render is None else render.frame.step
@@ -136,8 +140,28 @@ class PartTab(QWidget):
         self._show()
         self._show_regions()
 
+    def _as_rendered(self) -> tuple[Gauge, ...]:
+        """The project's measures; those of a laser that the shown render does not have are of none that it has."""
+        now, render = self.session.project, self.session.shown
+        if render is None:
+            return now.measures
+        there = same_lasers(now.scene, render.project.scene)
+        beyond = len(render.project.scene.lasers)
+        return tuple(
+            gauge.model_copy(update={"laser": there.get(gauge.laser, beyond + gauge.laser)}) for gauge in now.measures
+        )
+
+    def _laser_now(self) -> int | None:
+        """The laser whose profile is shown, among those of the project; None: it is gone."""
+        now, render = self.session.project.scene, self.session.shown
+        return self.laser if render is None else same_lasers(render.project.scene, now).get(self.laser)
+
     def start(self, kind: Kind) -> None:
         """The next drags are the regions of a new measure."""
+        if self._laser_now() is None:
+            gone = "this laser is no longer in the project: undo that, or render what is there now"
+            self.session.message.emit("warning", gone)
+            return
         self.placing, self._placed = kind, []
         self._show_regions()
         self._tell()
@@ -159,8 +183,8 @@ class PartTab(QWidget):
             self._show_regions()
             self._tell()
             return
-        now = self.session.project.measures
-        gauge = Gauge(name=_free_name(kind, now), kind=kind, laser=self.laser, regions=tuple(self._placed))
+        now, laser = self.session.project.measures, self._laser_now() or 0
+        gauge = Gauge(name=_free_name(kind, now), kind=kind, laser=laser, regions=tuple(self._placed))
         self._end_placing()
         self.chosen = len(now)
         if not self.session.set(("measures",), (*now, gauge), f"add {TITLES[kind].lower()}"):
@@ -201,8 +225,8 @@ class PartTab(QWidget):
         return gauge if gauge.laser == self.laser else None
 
     def _project_changed(self) -> None:
-        if self.session.project.measures is not self._read:
-            if {gauge.laser for gauge in self.session.project.measures} <= self._profiles.keys():
+        if self.session.project.measures is not self._measures:
+            if {gauge.laser for gauge in self._as_rendered()} <= self._profiles.keys():
                 self.refresh()
             else:
                 self.follow(self.laser)
@@ -265,8 +289,8 @@ class PartTab(QWidget):
         return of_all or (None if reading is None else judged_over_steps(reading.gauge, [reading]))
 
     def _show_row(self, row: int, gauge: Gauge, entry: dict[str, Any] | None) -> None:
-        lasers = self.session.project.scene.lasers
-        of_laser = f" ({lasers[gauge.laser].name})" if len(lasers) > 1 and gauge.laser < len(lasers) else ""
+        lasers, laser = self.session.project.scene.lasers, self._measures[row].laser
+        of_laser = f" ({lasers[laser].name})" if len(lasers) > 1 and laser < len(lasers) else ""
         texts = [gauge.name + of_laser, NONE, NONE, NONE, NONE]
         tip = f"<p>{TITLES[gauge.kind]}</p>{DEFINITIONS.get(gauge.kind, '')}"
         if entry is not None:

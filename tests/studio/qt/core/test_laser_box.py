@@ -7,11 +7,12 @@ from collections.abc import Iterator
 import pytest
 from pytestqt.qtbot import QtBot
 
+from analysis.gauges.gauge import Gauge
 from render.base.pose import Pose
 from render.render import render_world
 from render.run import Run
 from render.world.world import build_world
-from studio.editing.scene_edits import LASERS
+from studio.editing.scene_edits import LASERS, remove
 from studio.project.document import Document, replaced
 from studio.qt.core.laser_box import LaserBox, laser_of
 from studio.qt.core.live_preview import live
@@ -94,3 +95,32 @@ def test_picture_row_profile_and_results_follow_the_laser_that_is_selected(
     view.choice.activated.emit(light)
     results.laser.activated.emit(1)
     assert view.choice.currentText() == "Light of second" and session.selection == (*LASERS, 1)
+
+
+def test_a_measure_stays_on_its_laser_in_a_render_from_before_another_was_deleted(
+    qtbot: QtBot, rendered: tuple[Session, CameraView, ResultsPanel]
+) -> None:
+    session, view, results = rendered
+    gauges = [
+        Gauge(name=f"of {laser}", kind="radius", laser=laser, regions=((-0.02 + 0.001 * laser, 0.02),))
+        for laser in range(2)
+    ]
+    session.set(("measures",), tuple(gauges))
+    first, second = (one.value for one in results.part.readings)
+    assert first != second
+    session.select((*LASERS, 1))
+    project, path = remove(session.project, (*LASERS, 0))
+    session.document.apply("delete laser", project)
+    session.select(path)
+    # what is left is called as it was, by the panels of the render with both too
+    assert [laser.name for laser in session.project.scene.lasers] == ["second"]
+    assert [one.value for one in results.part.readings] == [second]
+    assert results.laser.currentText() == "second" and view.choice.currentText() != "Image, laser"
+    # a measure of the laser that is gone cannot be added
+    results.laser.activated.emit(0)
+    assert results.laser.currentText() == "laser"
+    with qtbot.waitSignal(session.message) as told:
+        results.part.start("radius")
+    assert "no longer in the project" in told.args[1] and results.part.placing is None
+    session.document.undo()
+    assert [one.value for one in results.part.readings] == [first, second]
