@@ -64,6 +64,21 @@ class Eye:
         unit = size[1] / (2.0 * self.half_height)
         return np.stack([size[0] / 2 + unit * scale * local[:, 0], size[1] / 2 - unit * scale * local[:, 1]], axis=1)
 
+    def sides(self, corners: tuple[tuple[float, float], tuple[float, float]], size: tuple[int, int]) -> Float:
+        """Two opposite corners (x, y) of a rectangle in the widget -> (4, 4) planes: a point (x, y, z, 1) m is seen
+        within it where its product with each is at least 0."""
+        (left, top), (right, bottom) = corners
+        around = [(left, top), (right, top), (right, bottom), (left, bottom)]
+        rays = [self.ray(x, y, size) for x, y in around]
+        origin, direction = self.ray(0.5 * (left + right), 0.5 * (top + bottom), size)
+        middle, planes = origin + self.distance * direction, []
+        for (first, along), (second, its) in zip(rays, rays[1:] + rays[:1], strict=True):
+            far = first + self.distance * along
+            normal = np.cross(far - first, second + self.distance * its - first)
+            normal /= np.linalg.norm(normal) * np.sign(normal @ (middle - first))
+            planes.append((*normal, -normal @ first))
+        return np.array(planes)
+
     def metres_per_pixel(self, point: Float, size: tuple[int, int]) -> float:
         """Length, across the line of sight at a point, of one pixel."""
         depth = self.distance if self.parallel else float((self.position - point) @ self.rotation[:, 2])

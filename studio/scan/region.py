@@ -61,21 +61,27 @@ class Region:
 
 @dataclass(frozen=True)
 class Box:
-    """Along the world's axes, on the part as it stands at step 0; its faces are part of it."""
+    """Along the world's axes, on the part as it stands at step 0, as far as it lies within planes; all faces are part
+    of it."""
 
     low: tuple[float, float, float] = (-math.inf,) * 3
     high: tuple[float, float, float] = (math.inf,) * 3
     """m."""
+    sides: tuple[tuple[float, float, float, float], ...] = ()
+    """a, b, c, d of each plane: a x + b y + c z + d is at least 0 within."""
     along: Literal["space"] = "space"
 
     @property
     def title(self) -> str:
-        sides = " x ".join(f"{1e3 * (high - low):.2f}" for low, high in zip(self.low, self.high, strict=True))
-        return f"a box of {sides} mm"
+        lengths = " x ".join(f"{1e3 * (high - low):.2f}" for low, high in zip(self.low, self.high, strict=True))
+        return f"what was drawn around, {lengths} mm" if self.sides else f"a box of {lengths} mm"
 
     def holds(self, points: Float) -> NDArray[np.bool_]:
         """(n,) of (n, 3) points on the part at step 0."""
-        return np.asarray(np.all((points >= self.low) & (points <= self.high), axis=1))
+        inside = np.all((points >= self.low) & (points <= self.high), axis=1)
+        for a, b, c, d in self.sides:
+            inside[inside] = points[inside] @ (a, b, c) + d >= 0.0
+        return np.asarray(inside)
 
     def of(self, found: Measurement, scene: Scene) -> NDArray[np.bool_]:
         """(m,) the points within it."""

@@ -119,13 +119,18 @@ class RegionTab(QWidget):
         self.session.message.emit("info", f"Wrote {path}: {count} points{methods}, {self.region.title}")
 
     def _of_which(self, region: Region | Box) -> str:
-        """Of a scan: scan lines and places across the fan are of the step that is looked at, a box may be of all."""
+        """Of several lasers the one; of a scan: scan lines and places across the fan are of the step that is looked at,
+        a box may be of all."""
         render = self.session.shown
-        if render is None or render.scan is None:
+        if render is None:
             return ""
+        lasers = render.project.scene.lasers
+        laser = f", of {lasers[self._laser].name}" if len(lasers) > 1 and self._laser < len(lasers) else ""
+        if render.scan is None:
+            return laser
         if isinstance(region, Box) and self._scan_bar.whole is not None:
-            return f", of all {render.scan.count} steps"
-        return f", of step {render.frame.step + 1} of {render.scan.count}"
+            return f"{laser}, of all {render.scan.count} steps"
+        return f"{laser}, of step {render.frame.step + 1} of {render.scan.count}"
 
     def _by_which(self, region: Region | Box) -> str:
         """Why a box shows one method, or by whose points it chooses the scan lines of all."""

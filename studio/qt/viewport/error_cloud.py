@@ -14,8 +14,9 @@ from PySide6.QtCore import QObject, QRect, Signal
 from PySide6.QtGui import QColor
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-from analysis.cloud import Cloud, at_step, cloud
+from analysis.cloud import Cloud, T_first_step, at_step, cloud
 from render.base.arrays import Float
+from render.base.pose import invert
 from studio.qt.core import theme
 from studio.qt.core.session import Session
 from studio.qt.viewport.colour_bar import ColourBar
@@ -167,7 +168,7 @@ class ErrorCloud(QObject):
             self.view.look_from(self.view.eye.framed(low, high, self.view.pixels))
 
     def take_box(self, rectangle: QRect) -> None:
-        """The box about the points within a rectangle of the view is the region to tell of."""
+        """The points within a rectangle of the view, as it is seen now, are the region to tell of."""
         x, y = self.view.eye.project(self.points, self.view.pixels).T if len(self.points) else np.zeros((2, 0))
         with np.errstate(invalid="ignore"):
             inside = (x >= rectangle.left()) & (x <= rectangle.right())
@@ -177,7 +178,12 @@ class ErrorCloud(QObject):
             return
         first = self._first[inside]
         low, high = np.floor(first.min(axis=0) * 1e6) * 1e-6, np.ceil(first.max(axis=0) * 1e6) * 1e-6
-        self.boxed.emit(Box(_three(low), _three(high)))
+        ends = (rectangle.left(), rectangle.top()), (rectangle.right(), rectangle.bottom())
+        sides = self.view.eye.sides(ends, self.view.pixels)
+        on_part = sides @ invert(T_first_step(self.session.project.scene, self.session.step))
+        self.boxed.emit(
+            Box(_three(low), _three(high), tuple((float(a), float(b), float(c), float(d)) for a, b, c, d in on_part))
+        )
 
     def show_box(self, region: object) -> None:
         """Draw a region that is a box; any other is drawn elsewhere."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QPoint, QPointF, QRect, Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
@@ -283,6 +283,25 @@ def test_a_rectangle_about_points_is_a_region_of_them(
     assert "the scan lines whose points by maximum likelihood" in results.region.title.text()
     results.region.clear.click()
     assert cloud.box is None
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_of_a_turned_view_a_rectangle_holds_what_is_seen_in_it_and_nothing_beside(
+    window: MainWindow, results: ResultsPanel, qtbot: QtBot, parallel: bool
+) -> None:
+    cloud: ErrorCloud = window.cloud
+    cloud.frame()
+    cloud.view.look_from(replace(cloud.view.eye.orbit(50.0, 25.0), parallel=parallel))
+    x, y = cloud.view.eye.project(cloud.points, cloud.view.pixels).T
+    middle = np.argmin(np.hypot(x - np.median(x), y - np.median(y)))
+    rectangle = QRect(round(float(x[middle])) - 5, round(float(y[middle])) - 40, 10, 80)
+    cloud.take_box(rectangle)
+    seen = (x >= rectangle.left()) & (x <= rectangle.right()) & (y >= rectangle.top()) & (y <= rectangle.bottom())
+    box = results.region.region
+    assert box is not None and 5 < seen.sum() < 0.3 * len(x)
+    np.testing.assert_array_equal(box.holds(cloud.points), seen)  # type: ignore[union-attr]
+    assert int(results.region.table.item(0, 0).text()) == seen.sum()
+    assert results.region.title.text().startswith("<b>What was drawn around")
 
 
 def test_a_rectangle_about_nothing_is_told_and_escape_gives_up(
