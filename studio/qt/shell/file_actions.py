@@ -213,7 +213,7 @@ class FileActions(QObject):
         return self._save(path if path.suffix else path.with_suffix(".json"))
 
     def may_close(self, *, quits: bool = False) -> bool:
-        """Whether the document may be given up; asks where unsaved work, a render under way or work of minutes goes.
+        """Whether the document may be given up; asks where unsaved work, a render under way or what took long goes.
 
         quits: the window with it.
         """

@@ -109,13 +109,13 @@ class TestFiles:
         panel, (world, frame) = window.panels["render"], small_render()
         kept = [Render(k, window.session.project, world, frame, kept=k == 1, asked=k != 2) for k in (1, 2, 3, 4)]
         monkeypatch.setattr(window.session, "renders", kept)
-        assert window.files.may_close(), "renders alone are not asked about"
-        long = [replace(one, frame=replace(frame, seconds={"laser light": 40.0})) for one in kept]
+        assert window.files.may_close(), "renders of moments are not asked about"
+        long = [replace(one, frame=replace(frame, seconds={"laser light": 6.0})) for one in kept]
         monkeypatch.setattr(window.session, "renders", long)
         said: list[str] = []
         monkeypatch.setattr("studio.qt.shell.file_actions.ask_loss", lambda parent, text: said.append(text) or False)
-        assert not window.files.may_close(), "those of minutes are"
-        assert "2 renders of this session, 1 min of work, are kept nowhere" in said[0]
+        assert not window.files.may_close(), "those that took longer are"
+        assert "2 renders of this session, 12 s of work, are kept nowhere" in said[0]
         monkeypatch.setattr(window.session, "renders", kept)
         window.runner.run(RENDER, "render", until_cancelled)
         monkeypatch.setattr(panel, "asked", False)
