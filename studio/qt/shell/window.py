@@ -41,8 +41,8 @@ from studio.qt.shell.help import Help, panel_with_focus
 from studio.qt.shell.motion_calls import join_motion
 from studio.qt.shell.panels import PANELS, Making, Panels
 from studio.qt.shell.preferring import Preferring
-from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.seen_selection import where_seen
+from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.status import StatusBar
 from studio.qt.shell.toolbar import SWITCH, add_toolbar
 from studio.qt.shell.tour import Step, Tour
@@ -273,10 +273,10 @@ class MainWindow(QMainWindow):
             "quit": self.close,
             "undo": lambda: session.document.undo(),
             "redo": lambda: session.document.redo(),
-            "duplicate": where_seen(scene_actions.duplicate, session, self.docks, self.centralWidget()),
-            "delete": where_seen(scene_actions.remove, session, self.docks, self.centralWidget()),
+            "duplicate": where_seen(scene_actions.duplicate, session, self.docks, self.panels.place("viewport")),
+            "delete": where_seen(scene_actions.remove, session, self.docks, self.panels.place("viewport")),
             "rename": self._rename,
-            "hide": where_seen(scene_actions.toggle_visible, session, self.docks, self.centralWidget()),
+            "hide": where_seen(scene_actions.toggle_visible, session, self.docks, self.panels.place("viewport")),
             "copy_python": lambda: copy_shown(session),
             "deselect": lambda: session.select(()),
             "import_mesh": lambda: choose_meshes(session, self),
