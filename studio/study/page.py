@@ -70,12 +70,18 @@ def write_page(
         "parts": parts,
         "cells": len(rows),
         "repeats": study.repeats,
-        "bases": ", ".join(sorted(bases)),
+        "bases": ", ".join(sorted(bases)) + _of_laser(study, bases),
     }
     page = page_of(Path(__file__).parent / "page.html", content)
     with atomic_write(folder / "study.html") as temporary:
         temporary.write_text(page, encoding="utf-8")
     return folder / "study.html", found
+
+
+def _of_laser(study: Study, bases: Mapping[str, Project]) -> str:
+    """Of several lasers the one that is measured."""
+    lasers = bases[study.base].scene.lasers
+    return f" · of {lasers[study.laser].name}, one of {len(lasers)} lasers" if len(lasers) > 1 else ""
 
 
 def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:

@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, Signal
 
 from render.base.errors import InputError
 from render.base.threads import Cancel
+from studio.editing.scene_edits import LASERS
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner
 from studio.qt.core.session import Render, Session
 from studio.runtime.jobs import Job, Progress
@@ -49,6 +50,7 @@ class CellOpener(QObject):
         session, document = self.session, self.session.document
         cell, scale = found.cell_of(number, spot), found.study.image_scale
         there = next((one for one in session.renders if one.cell == cell.key), None)
+        self._look_at_its_laser(found)
         if there is not None:
             session.show(there)
             self.opened.emit()
@@ -74,6 +76,12 @@ class CellOpener(QObject):
                 self._take(found, number, cell, frame, self._waited_for and session.shown is before)
 
         self._job = jobs.run(RENDER, "cell of the study", work, then)
+
+    def _look_at_its_laser(self, found: Found) -> None:
+        """What is shown of the cell is of the laser that the study measures."""
+        laser = found.study.laser
+        if len(self.session.project.scene.lasers) > max(laser, 1):
+            self.session.select((*LASERS, laser))
 
     def _take(self, found: Found, number: int, cell: Cell, frame: RenderedFrame, show: bool) -> None:
         from studio.study.labels import value_text

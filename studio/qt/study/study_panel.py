@@ -53,6 +53,8 @@ class StudyPanel(QWidget):
         self.files.setMenu(menu)
         self.base = ChoiceBox()
         self.base.setToolTip("The project that every cell is a variation of")
+        self.laser = ChoiceBox()
+        self.laser.setToolTip("The laser whose line every cell measures")
         self.sweeps = ChoiceBox()
         self.sweeps.setToolTip("A study has one chart for each sweep; type to give this one another name")
         self.sweeps.setEditable(True)
@@ -95,21 +97,30 @@ class StudyPanel(QWidget):
         work, draft = self.work, self.work.draft
         if not self.name.hasFocus():
             self.name.setText(draft["name"])
-        for box in (self.base, self.sweeps, self.repeats, self.scale):
+        for box in (self.base, self.laser, self.sweeps, self.repeats, self.scale):
             box.blockSignals(True)
         self.base.clear()
         self.base.addItem(self._open_project())
         if draft["base"] in work.loaded:
             self.base.addItem(f"{draft['base'].replace('_', ' ')}, as in the study")
             self.base.setCurrentIndex(1)
+        self._show_lasers()
         self.sweeps.clear()
         self.sweeps.addItems([sweep["name"] for sweep in draft["sweeps"]])
         self.sweeps.setCurrentIndex(work.chosen)
         self.repeats.setValue(draft.get("repeats", Study.model_fields["repeats"].default))
         self.scale.setValue(draft.get("image_scale", 1.0))
-        for box in (self.base, self.sweeps, self.repeats, self.scale):
+        for box in (self.base, self.laser, self.sweeps, self.repeats, self.scale):
             box.blockSignals(False)
         self.remove_sweep.setEnabled(len(draft["sweeps"]) > 1)
+
+    def _show_lasers(self) -> None:
+        names, chosen = [laser.name for laser in self.work.project().scene.lasers], self.work.draft.get("laser", 0)
+        if names != [self.laser.itemText(i) for i in range(self.laser.count())]:
+            self.laser.clear()
+            self.laser.addItems(names)
+        self.laser.setCurrentIndex(chosen if chosen < len(names) else -1)
+        self.laser.setVisible(len(names) > 1 or chosen >= len(names))
 
     def _open_project(self) -> str:
         return f"Open: {self.session.project.name}"
@@ -179,6 +190,7 @@ class StudyPanel(QWidget):
         work = self.work
         self.name.editingFinished.connect(self._rename)
         self.base.activated.connect(lambda i: work.use_open_project() if i == 0 else None)
+        self.laser.activated.connect(lambda i: work.change(lambda draft: draft.update(laser=i)))
         self.sweeps.activated.connect(work.choose_sweep)
         line = self.sweeps.lineEdit()
         if line is not None:
@@ -196,7 +208,11 @@ class StudyPanel(QWidget):
         work.unseen.progress.connect(self._tell_timing)
         self.runner.progress.connect(self._tell_progress)
         self.session.document_replaced.connect(self.refresh)
-        self.session.project_changed.connect(lambda: self.base.setItemText(0, self._open_project()))
+        self.session.project_changed.connect(self._follow_project)
+
+    def _follow_project(self) -> None:
+        self.base.setItemText(0, self._open_project())
+        self._show_lasers()
 
     def _tell_estimate(self) -> None:
         work, empty = self.work, varies_nothing(self.work.draft)
@@ -241,7 +257,10 @@ class StudyPanel(QWidget):
         form = QFormLayout()
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         form.addRow("Study", head)
-        form.addRow("Of", self.base)
+        of = QHBoxLayout()
+        of.addWidget(self.base, 1)
+        of.addWidget(self.laser)
+        form.addRow("Of", of)
         form.addRow("Sweep", sweeps)
         runs = QHBoxLayout()
         runs.addWidget(self.repeats)

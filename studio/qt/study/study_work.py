@@ -28,7 +28,7 @@ from studio.study.estimate import Costs, Estimate
 from studio.study.folder_run import Found, in_window, run_into
 from studio.study.kept_draft import keep_draft, kept_draft, kept_folder
 from studio.study.store import FILE
-from studio.study.study import Study
+from studio.study.study import Study, require_laser
 from studio.study.study_file import base_name, write_study
 
 OF_ANOTHER = "The folder holds a study of another set-up. {}. Choose another folder, or undo the change."
@@ -109,12 +109,14 @@ class StudyWork(LongWork):
         return finished(self.draft)
 
     def bases(self, study: Study) -> dict[str, Project]:
-        """Of the study by their names. InputError: one cannot be read."""
+        """Of the study by their names. InputError: one cannot be read, or has no such laser as is measured."""
         names = {study.base, *(sweep.base for sweep in study.sweeps if sweep.base is not None)}
         document = self.session.document
         own = self.session.project.in_folder(document.root)
         missing = {name: own for name in names if name not in self.loaded}
         bases = {**{name: self.loaded[name] for name in names if name in self.loaded}, **missing}
+        for name, project in bases.items():
+            require_laser(project, study.laser, f"laser, of {name}")
         return bases if self.found is None else as_begun(study, bases, self.found.bases)
 
     # the draft

@@ -9,6 +9,7 @@ import pytest
 from PySide6.QtCore import QPointF, Qt
 from pytestqt.qtbot import QtBot
 
+from studio.editing.scene_edits import LASERS
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.scan.folder_lock import hold
 from studio.study.draft import VALUES
@@ -70,6 +71,22 @@ class TestDraft:
         qtbot.mouseClick(desk.panel.time, Qt.MouseButton.LeftButton)
         qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.seconds is not None)
         assert "12 cells of 2 renders to go, about" in desk.panel.told.text()
+
+    def test_of_several_lasers_the_one_that_is_measured_is_chosen(self, qtbot: QtBot, desk: Desk) -> None:
+        desk.small([2.0, 4.0])
+        assert desk.panel.laser.isHidden()
+        first = desk.session.project.scene.lasers[0]
+        desk.session.set(LASERS, (first, first.model_copy(update={"name": "second"})))
+        assert not desk.panel.laser.isHidden() and desk.panel.laser.currentText() == first.name
+        desk.panel.laser.setCurrentIndex(1)
+        desk.panel.laser.activated.emit(1)
+        assert desk.work.study().laser == 1 and desk.panel.laser.currentText() == "second"
+        # what is not there any more is told, and another can be chosen
+        desk.session.set(LASERS, (first,))
+        qtbot.waitUntil(lambda: "no such laser" in desk.panel.problem.text())
+        assert not desk.panel.laser.isHidden()
+        desk.panel.laser.activated.emit(0)
+        assert desk.work.study().laser == 0 and desk.panel.laser.isHidden()
 
     def test_a_study_that_nobody_has_begun_is_no_fault(self, desk: Desk) -> None:
         desk.work.look_ahead()
