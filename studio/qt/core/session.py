@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,9 @@ from studio.project.project import Project
 from studio.scan.redevelop import Development, is_stale
 from studio.scan.scan_results import ScanResults
 from studio.scan.stages import Measurement
+
+if TYPE_CHECKING:
+    from studio.scan.measures_in_3d import MeasureIn3D
 
 Follower = TypeVar("Follower", bound=QObject)
 
@@ -186,6 +189,8 @@ class Session(QObject):
     """`ghost` is another."""
     deviation_changed = Signal()
     """`deviation` is another."""
+    measures_changed = Signal()
+    """`measures_in_3d` are others."""
     section_changed = Signal()
     """`section` is another."""
 
@@ -213,6 +218,8 @@ class Session(QObject):
         """What the panel of the section shows in 3D, and the 3D view moves; None: nothing."""
         self.deviation: ShownDeviation | None = None
         """What the panel of the deviation shows in 3D; None: nothing."""
+        self.measures_in_3d: tuple[MeasureIn3D, ...] = ()
+        """Measures of the part as the results have read them off the shown render."""
         self.last_folder: Callable[[], str] = str
         """Where a file was opened or saved last, as the preferences keep it; empty: nowhere yet."""
         self.document = document
@@ -223,6 +230,11 @@ class Session(QObject):
         if deviation is not self.deviation:
             self.deviation = deviation
             self.deviation_changed.emit()
+
+    def show_measures_in_3d(self, measures: tuple[MeasureIn3D, ...]) -> None:
+        if measures or self.measures_in_3d:
+            self.measures_in_3d = measures
+            self.measures_changed.emit()
 
     def show_range(self, ends: tuple[float, float] | None) -> None:
         """None: no range of scan lines."""

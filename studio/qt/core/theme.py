@@ -85,6 +85,12 @@ def colours() -> Colours:
     return DARK if QApplication.palette().color(QPalette.ColorRole.Window).lightness() < 128 else LIGHT
 
 
+def verdict_colour(verdict: str | None) -> str:
+    """Of this theme: by the verdict, where there is one."""
+    c = colours()
+    return {"pass": c.good, "fail": c.error, "undecided": c.warning}.get(verdict or "", c.accent)
+
+
 def palette(c: Colours) -> QPalette:
     """The Qt palette of a theme."""
     role, group = QPalette.ColorRole, QPalette.ColorGroup

@@ -25,12 +25,6 @@ TO_PLOT = np.array([1e3, -1e3])
 """From across and height, m, to the plot's mm along the fan and mm from the laser."""
 
 
-def verdict_colour(verdict: str | None) -> str:
-    """Of this theme: by the verdict, where there is one."""
-    c = theme.colours()
-    return {"pass": c.good, "fail": c.error, "undecided": c.warning}.get(verdict or "", c.accent)
-
-
 class PartDrawing(QObject):
     """Over a profile's plot. `moving` and `moved` tell the regions of the chosen measure, m, as edges are dragged."""
 
@@ -55,7 +49,7 @@ class PartDrawing(QObject):
             if profile is None or one.reason:
                 continue
             curves, dimension = outline(one.gauge, profile)
-            is_chosen, colour = one.gauge == chosen, verdict_colour(one.verdict)
+            is_chosen, colour = one.gauge == chosen, theme.verdict_colour(one.verdict)
             for curve in curves:
                 self._line(curve, pg.mkPen(colour, width=3.0 if is_chosen else 1.6))
             if len(dimension):

@@ -25,17 +25,19 @@ from analysis.gauges.read import Reading
 from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, value_text, verdict_text
 from analysis.report.units import NONE
 from studio.project.same_lasers import same_lasers
+from studio.qt.core import theme
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import keep_room, text_button
 from studio.qt.results.measures_table import ReadOnlyTable
-from studio.qt.results.part_drawing import PartDrawing, verdict_colour
+from studio.qt.results.part_drawing import PartDrawing
 from studio.qt.results.part_editor import PartEditor
 from studio.qt.results.part_steps import PartSteps
 from studio.qt.results.results_profile import ProfilePlot
 from studio.qt.results.scan_bar import ScanBar
 from studio.scan.gauging import OF_SCAN, judged_over_steps, kept_readings, profiles, read_each
+from studio.scan.measures_in_3d import MeasureIn3D, measures_in_3d
 from studio.scan.remarks import best
 from studio.scan.sheet_lean import SECTIONS, lean_text
 
@@ -280,7 +282,19 @@ class PartTab(QWidget):
         own = self.readings[index].gauge if self.readings and index >= 0 else None
         profile = self._profiles[self.laser][0] if self.laser in self._profiles else None
         self.drawing.show_readings(of_laser, profile, own)
+        self.session.show_measures_in_3d(self._in_3d())
         self._tell()
+
+    def _in_3d(self) -> tuple[MeasureIn3D, ...]:
+        """Of all lasers, where they were read."""
+        render, section = self.session.shown, self.session.project.measured_in
+        if render is None:
+            return ()
+        scene, step, found = render.project.scene, render.frame.step, []
+        for laser, (measured, _) in self._profiles.items():
+            of_laser = [one for one in self.readings if one.gauge.laser == laser]
+            found += measures_in_3d(of_laser, measured, scene, laser, step, section)
+        return tuple(found)
 
     def _entry(self, row: int) -> dict[str, Any] | None:
         """Of all steps where these are asked for and measured like this, else of the step that is looked at."""
@@ -313,7 +327,7 @@ class PartTab(QWidget):
             if column == 0:
                 item.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
             if column == len(texts) - 1 and entry is not None and entry["verdict"]:
-                item.setForeground(QColor(verdict_colour(entry["verdict"])))
+                item.setForeground(QColor(theme.verdict_colour(entry["verdict"])))
 
     def _tell(self) -> None:
         """What to do next, or why the chosen measure has no value."""

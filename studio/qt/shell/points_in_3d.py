@@ -7,11 +7,13 @@ from typing import Any
 from studio.qt.core.session import Session
 from studio.qt.shell.panels import Panels
 from studio.qt.viewport.error_cloud import ErrorCloud
+from studio.qt.viewport.measure_marks import MeasureMarks
 
 
 def points_in_3d(session: Session, panels: Panels, viewport: Any) -> ErrorCloud:
     """Joined to the panels that say which points, and to those that hear of a point or a box that is chosen."""
     made, motion = ErrorCloud(session, viewport.view), panels["motion"]
+    MeasureMarks(session, viewport.view, made)
 
     def join_results(results: Any) -> None:
         made.choose(results.view)

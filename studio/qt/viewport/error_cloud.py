@@ -42,6 +42,8 @@ class ErrorCloud(QObject):
 
     pressed = Signal(int)
     """The scan line of the point that is clicked."""
+    shown_changed = Signal()
+    """`visible` is another."""
     boxed = Signal(object)
     """A `Box` about points, to be told of."""
 
@@ -289,6 +291,7 @@ class ErrorCloud(QObject):
         self.bar.setVisible(shown)
         if changed:
             self._draw_box()
+            self.shown_changed.emit()
 
     def _follow_step(self) -> None:
         motion = self.session.project.scene.motion

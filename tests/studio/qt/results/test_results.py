@@ -12,6 +12,7 @@ from PySide6.QtCore import QPoint, QPointF, QRect, Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
+from analysis.gauges.gauge import Gauge
 from analysis.report.units import percent
 from render.world.world import build_world
 from studio.project.project import Project
@@ -20,6 +21,7 @@ from studio.qt.results.measures_table import shown
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell.window import MainWindow
 from studio.qt.viewport.error_cloud import ErrorCloud
+from studio.qt.viewport.measure_marks import MeasureMarks
 from studio.scan.region import Region, members
 from studio.scan.stages import Clock, develop_step, measure_step, render_step
 
@@ -247,6 +249,35 @@ def test_a_click_on_a_point_in_3d_keeps_its_row_and_selects_nothing(
     assert np.linalg.norm(apart, axis=1).min() < 3.0
     results.pin(results.pinned)
     assert results.pinned is None
+
+
+def test_a_measure_stands_in_3d_where_it_was_read_with_its_verdict(
+    window: MainWindow, results: ResultsPanel, qtbot: QtBot
+) -> None:
+    session, cloud = window.session, window.cloud
+    profile = results.part._profiles[0][0].position
+    top = profile[:, 1] > np.median(profile[:, 1]) + 0.002
+    ends = [(float(x.min()), float(x.max())) for x in (profile[~top, 0], profile[top, 0])]
+    regions = ((ends[0][0] + 0.001, ends[1][0] - 0.002), (ends[1][0] + 0.002, ends[1][1] - 0.002))
+    gauge = Gauge(name="Step", kind="step", regions=regions)
+    session.set(("measures",), (gauge,))
+    (one,) = session.measures_in_3d
+    value = results.part.readings[0].value
+    assert one.verdict is None and one.text.startswith(f"Step: {1e3 * value:.2f}"[:9])
+    # its lines are where the points are, by the value apart
+    nearest = [np.linalg.norm(cloud.points - end, axis=1).min() for line in one.lines[:-1] for end in line[[0, -1]]]
+    assert max(nearest) < 0.004
+    assert np.linalg.norm(np.diff(one.lines[-1][[0, -1]], axis=0)) == pytest.approx(abs(value), rel=1e-3)
+    marks = next(child for child in cloud.view.children() if isinstance(child, MeasureMarks))
+    assert [label.GetInput() for label in marks.labels] == [one.text]
+    session.set(("measures",), (gauge.model_copy(update={"nominal": value, "lower": -0.005, "upper": 0.005}),))
+    assert session.measures_in_3d[0].verdict == "pass" and "pass" in marks.labels[0].GetInput()
+    # it goes with the points that it was read off
+    scene = session.project.scene
+    session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.9 * scene.lasers[0].fan_angle)
+    assert cloud.visible and marks.labels
+    window.switch_to("setup")
+    assert not cloud.visible and not marks.labels
 
 
 def test_a_rectangle_about_points_is_a_region_of_them(

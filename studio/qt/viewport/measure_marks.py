@@ -1,0 +1,67 @@
+"""Measures of the part in the 3D view: their lines on the part, and their values in the colour of the verdict."""
+
+from __future__ import annotations
+
+import pyvista as pv
+from PySide6.QtCore import QObject
+from vtkmodules.vtkRenderingCore import vtkBillboardTextActor3D
+
+from analysis.cloud import at_step
+from studio.qt.core import theme
+from studio.qt.core.session import Session
+from studio.qt.viewport.error_cloud import ErrorCloud
+from studio.qt.viewport.view3d import View3D
+from studio.qt.viewport.viewport_scene import Lines
+from studio.scan.measures_in_3d import MeasureIn3D
+
+MEASURE_PX, FONT_PX = 3.0, 13
+GROUND = 0.9
+"""Opacity of what a text stands on, over points of any colour."""
+
+
+class MeasureMarks(QObject):
+    """Seen while the points are that they were read off."""
+
+    def __init__(self, session: Session, view: View3D, cloud: ErrorCloud) -> None:
+        super().__init__(view)
+        self.session, self.view, self.cloud = session, view, cloud
+        self._lines: list[Lines] = []
+        self.labels: list[vtkBillboardTextActor3D] = []
+        session.measures_changed.connect(self.draw)
+        session.step_changed.connect(self.draw)
+        cloud.shown_changed.connect(self.draw)
+        theme.notice.changed.connect(self.draw)
+
+    def draw(self) -> None:
+        """All anew: they are few."""
+        renderer = self.view.renderer
+        for actor in (*(one.actor for one in self._lines), *self.labels):
+            renderer.RemoveActor(actor)
+        self._lines, self.labels = [], []
+        for one in self.session.measures_in_3d if self.cloud.visible else ():
+            self._add(one)
+        for actor in (*(one.actor for one in self._lines), *self.labels):
+            renderer.AddActor(actor)
+        self.view.redraw()
+
+    def _add(self, one: MeasureIn3D) -> None:
+        scene, step = self.session.project.scene, self.session.step
+        colour = theme.verdict_colour(one.verdict)
+        for line in one.lines:
+            drawn = Lines(MEASURE_PX)
+            drawn.lines(at_step(line, scene, step), [(i, i + 1) for i in range(len(line) - 1)])
+            drawn.colour(colour)
+            drawn.actor.PickableOff()
+            self._lines.append(drawn)
+        label = vtkBillboardTextActor3D()
+        label.SetInput(one.text)
+        label.SetPosition(*at_step(one.place[None], scene, step)[0])
+        label.SetDisplayOffset(8, 8)
+        look = label.GetTextProperty()
+        look.SetFontSize(FONT_PX)
+        look.BoldOn()
+        look.SetColor(*pv.Color(colour).float_rgb)
+        look.SetBackgroundColor(*pv.Color(theme.colours().base).float_rgb)
+        look.SetBackgroundOpacity(GROUND)
+        label.PickableOff()
+        self.labels.append(label)
