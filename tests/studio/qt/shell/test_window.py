@@ -397,17 +397,3 @@ def test_a_bad_project_on_the_command_line_is_told_over_the_sample(
     dialog("trouble").close()
     window.close()
     window.deleteLater()
-
-
-@pytest.mark.parametrize("key", ["delete", "duplicate"])
-def test_what_is_selected_is_changed_only_where_it_is_seen(window, qtbot, key):
-    session = window.session
-    session.select(("scene", "rig", "lasers", 0))
-    before = session.project
-    window.switch_to("study")
-    with qtbot.waitSignal(session.message) as told:
-        window.commands[key].trigger()
-    assert session.project is before and "cannot be seen here" in told.args[1]
-    window.switch_to("measure")  # the 3D view is there
-    window.commands[key].trigger()
-    assert session.project is not before
