@@ -8,7 +8,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import get_args
 
-import numpy as np
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QCloseEvent
 from PySide6.QtWidgets import (
@@ -39,6 +38,7 @@ from studio.qt.forms.log_field import LogField
 from studio.qt.image.line_overlay import swatch, ticked_swatch
 from studio.qt.render.automatic_exposure import filling
 from studio.runtime.jobs import Job, Progress
+from studio.scan.brightness import brightness
 from studio.scan.redevelop import Development, develop_again, development, measure_again
 from studio.scan.results import METHODS
 from studio.scan.stages import Measurement
@@ -298,7 +298,7 @@ class DevelopPanel(QWidget):
             images = develop_again(frame, how, noise=noise, cancelled=cancelled)
             seconds = time.perf_counter() - start
             blur = how.project.sensor.defocus_by(how.project.scene.camera.lens.model)
-            told = brightness(images, names) + (f"\ndefocus by {blur}" if blur != "nothing" else "")
+            told = brightness(images, names, frame) + (f"\ndefocus by {blur}" if blur != "nothing" else "")
             told += f"\n{OF_A_CELL}" if render.cell else ""
             render.noise = noise
             self._images_ready.emit(render, (frame, how), images, seconds, told)
@@ -383,14 +383,3 @@ class DevelopPanel(QWidget):
         if job.problem is not None:
             self.session.message.emit("error", job.problem.text)
             one_of(FiguresAge, self.session).give_up()
-
-
-def brightness(images: list[Image], names: list[str]) -> str:
-    """The brightest pixel of each image, be it the line's or not, and how much of it is saturated."""
-    lines = []
-    for image, name in zip(images, names or [""], strict=True):
-        top, full = int(image.pixels.max()), float(np.mean(image.pixels >= image.saturation))
-        saturated = f", {full:.2%} of the pixels saturated" if full > 0.0 else ""
-        prefix = f"{name}: " if len(images) > 1 else ""
-        lines.append(f"{prefix}brightest pixel of all {top} DN, {top / image.saturation:.0%} of full{saturated}")
-    return "\n".join(lines)
