@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from functools import partial
+from html import escape
 from typing import get_args
 
 from PySide6.QtCore import Qt, QTimer, Signal
@@ -21,7 +22,7 @@ from PySide6.QtWidgets import (
 
 from analysis.line.settings import Method
 from analysis.report.colour import hex_colour, method_colour, method_name, wavelength_colour
-from analysis.report.units import percent
+from analysis.report.units import micrometres, percent
 from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.frame import Frame
@@ -363,13 +364,14 @@ class DevelopPanel(QWidget):
     def _tell_measures(self, found: dict[str, list[Measurement]]) -> None:
         small = f" at {self._told_of.scanner_scale:.3g} x" if self._told_of and self._told_of.scanner_scale != 1 else ""
         rows = [f"<tr><th align='left'>RMSE{small}&nbsp;</th><th>px</th><th>depth</th><th>rows</th></tr>"]
+        lasers = [laser.name for laser in self._told_of.project.scene.lasers] if self._told_of else []
         for method, by_laser in found.items():
             for item in by_laser:
-                name = method_name(method) + (f", {item.laser + 1}" if len(by_laser) > 1 else "")
-                u, depth = item.errors.u.rmse, item.errors.depth_z.rmse
+                name = method_name(method) + (f", {escape(lasers[item.laser])}" if len(by_laser) > 1 else "")
+                u, depth = item.errors.u.rmse, micrometres(item.errors.depth_z.rmse)
                 rows.append(
                     f"<tr><td><span style='color:{method_colour(method)}'>&#9632;</span> {name}&nbsp;&nbsp;</td>"
-                    f"<td align='right'>{u:.3f}&nbsp;&nbsp;</td><td align='right'>{1e6 * depth:.1f} µm&nbsp;&nbsp;</td>"
+                    f"<td align='right'>{u:.3f}&nbsp;&nbsp;</td><td align='right'>{depth}&nbsp;&nbsp;</td>"
                     f"<td align='right'>{percent(item.errors.completeness)}</td></tr>"
                 )
         self.table.setText(f"<table cellspacing='2'>{''.join(rows)}</table>")

@@ -11,6 +11,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QIcon
 
 from analysis.gauges.gauge import Gauge
+from studio.project.document import replaced
 from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import one_of
@@ -55,6 +56,17 @@ def test_a_shown_render_is_developed_and_measured_by_every_method(panel):
     assert set(render.measurements) == {"likelihood", "gaussian", "centre_of_mass"}
     assert render.images[0].pixels.shape == render.frame.shape
     assert "µm" in panel.table.text() and "DN" in panel.told.text()
+
+
+def test_of_several_lasers_each_has_its_name(panel):
+    """They stood there as "likelihood, 1" and "likelihood, 2"."""
+    render = panel.session.shown
+    laser = render.project.scene.lasers[0]
+    two = replaced(render.project, ("scene", "rig", "lasers"), (laser, laser.model_copy(update={"name": "left <2>"})))
+    panel._told_of = replace(render, project=two)
+    (one,) = render.measurements["likelihood"]
+    panel._tell_measures({"likelihood": [one, replace(one, laser=1)]})
+    assert f", {laser.name}&nbsp;" in panel.table.text() and ", left &lt;2&gt;&nbsp;" in panel.table.text()
 
 
 def test_typing_half_the_exposure_halves_the_electrons_without_rendering(qtbot, panel):
