@@ -23,6 +23,8 @@ Index = NDArray[np.intp]
 
 MATCH_SIGMAS = 2.0
 """Sigmas from a line's centre to its 1/e^2 edge: a peak farther off is an outlier, however wide the errors spread."""
+END = 5
+"""Scan lines beyond the last that the line crosses, and px beside it, within which a peak is of that end's light."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,9 @@ class Errors:
     measured_rows: int
     """Scan lines on which a point matches the truth and is no outlier."""
     false_rows: int
-    """Scan lines with a point where there is no line to be seen."""
+    """Scan lines with a peak where there is no line to be seen, also with one whose ray gives it no depth."""
+    false_rows_at_ends: int
+    """Those of them whose peaks are all next to an end of the line."""
 
     @property
     def completeness(self) -> float:
@@ -109,6 +113,10 @@ def compare(
     wrong = outliers(position, 1.0, edge)
     valid_rows = np.unique(points.index[points.valid])
     truth_rows = np.unique(curve.index[lit])
+    false = ~np.isin(points.index, truth_rows)
+    index = points.index[false]
+    crossings = np.column_stack([curve.index[lit], curve.position[lit]])
+    away = index[~_beside_end(np.column_stack([index, along[false]]), crossings)] if len(index) else index
     return Errors(
         truth=truth,
         position=position,
@@ -125,8 +133,16 @@ def compare(
         truth_rows=len(truth_rows),
         valid_rows=len(valid_rows),
         measured_rows=len(np.unique(points.index[matched & ~wrong])),
-        false_rows=len(np.setdiff1d(valid_rows, truth_rows)),
+        false_rows=len(np.unique(index)),
+        false_rows_at_ends=len(np.setdiff1d(index, away)),
     )
+
+
+def _beside_end(peaks: Float, crossings: Float) -> NDArray[np.bool_]:
+    """(m,) of (m, 2) peaks on scan lines without the line: a true crossing (n, 2) is near; both as scan line and px."""
+    from scipy.spatial import cKDTree  # takes a while: not before something is false
+
+    return np.asarray(cKDTree(crossings).query(peaks, p=np.inf)[0] <= END)
 
 
 def systematic_along(points: Points, direction: Float, sheet: Float) -> Float:

@@ -17,7 +17,7 @@ from analysis.report.sample import IMAGE, MOST_LINES, ROW, Rows, Sample, rows_of
 from analysis.report.sums import Sums
 from analysis.report.total import Chosen, depth_measures
 from analysis.spool import Spool
-from render.base.counts import OF_GROUPS, Quantity
+from render.base.counts import INDIRECT_ERROR, OF_GROUPS, UNASKED_INDIRECT_ERROR, Quantity
 from render.scene.scene import Scene
 
 
@@ -103,8 +103,9 @@ class ScanRecord:
                 for name, quantity in quantities.items():
                     # of light for the line the error is of its position, in sigmas
                     value = one.image_error if name == "error" and one.of == "line" else getattr(one, name)
+                    told = UNASKED_INDIRECT_ERROR if one.of == "line" and quantity == INDIRECT_ERROR else quantity
                     if value is not None and value == value:  # an error may not be known
-                        yield quantity if one.laser is None else quantity.of(i), float(value)
+                        yield told if one.laser is None else told.of(i), float(value)
 
     def close(self) -> None:
         self._spool.close()

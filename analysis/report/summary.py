@@ -106,12 +106,7 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
             f"{'has' if missed == 1 else 'have'} no right measurement: the line there is too faint, cut, or overlaid."
         )
     if found.false_rows:
-        their = "its" if found.false_rows == 1 else "their"
-        carry = f"{'carries' if found.false_rows == 1 else 'carry'} a point although no line crosses {their}"
-        said.append(
-            f"{counted(found.false_rows, 'false scan line')} {carry} centre, at the ends of the line, from stray "
-            f"light or noise alone. {their.capitalize()} distance from the surface counts, {their} depth has no truth."
-        )
+        said.append(_of_false_rows(found.false_rows, found.false_rows_at_ends))
     # what most points err by, all alike and each on its own
     usual = np.hypot(found.depth_z.median, found.depth_z.robust_sigma)
     dominated = found.depth_z.rmse > DOMINATED * usual
@@ -167,6 +162,18 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
             f"{percent(found.saturated)} of the peaks are saturated and were measured from what is left of them."
         )
     return said
+
+
+def _of_false_rows(false: int, at_ends: int) -> str:
+    """at_ends: those of them next to an end of the line."""
+    away = f"{count(false - at_ends)} away from it, of stray light or noise alone"
+    where = ", of stray light or noise alone" if at_ends == 0 else f": {count(at_ends)} next to an end of the line"
+    where += f" and {away}" if 0 < at_ends < false else ""
+    carry, their = ("carries", "its") if false == 1 else ("carry", "their")
+    return (
+        f"{counted(false, 'false scan line')} {carry} a point although no line crosses {their} centre"
+        f"{where}. What distance from the surface such a point has counts; its depth has no truth."
+    )
 
 
 def sample_note(found: Total) -> str:

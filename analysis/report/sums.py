@@ -55,6 +55,7 @@ class Sums:
     valid_rows: int = 0
     measured_rows: int = 0
     false_rows: int = 0
+    false_rows_at_ends: int = 0
     position: Moments = field(default_factory=Moments)
     depth: Moments = field(default_factory=Moments)
     off_surface: Moments = field(default_factory=Moments)
@@ -68,6 +69,7 @@ class Sums:
         self.valid_rows += errors.valid_rows
         self.measured_rows += errors.measured_rows
         self.false_rows += errors.false_rows
+        self.false_rows_at_ends += errors.false_rows_at_ends
         self.position.add(errors.position, points.sigma_pixel)
         self.depth.add(errors.depth, points.sigma_depth)
         self.off_surface.add(errors.off_surface, errors.sigma_off_surface)
@@ -80,6 +82,7 @@ class Sums:
         self.valid_rows += other.valid_rows
         self.measured_rows += other.measured_rows
         self.false_rows += other.false_rows
+        self.false_rows_at_ends += other.false_rows_at_ends
         self.position.merge(other.position)
         self.depth.merge(other.depth)
         self.off_surface.merge(other.off_surface)

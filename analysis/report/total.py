@@ -51,6 +51,8 @@ class Total:
     valid_rows: int
     measured_rows: int
     false_rows: int
+    false_rows_at_ends: int
+    """Those of them that are next to an end of the line."""
     lines_kept: int
     lines: int
     narrow: float = 0.0
@@ -92,6 +94,7 @@ def total(chosen: Chosen) -> Total:
         valid_rows=sums.valid_rows,
         measured_rows=sums.measured_rows,
         false_rows=sums.false_rows,
+        false_rows_at_ends=sums.false_rows_at_ends,
         lines_kept=chosen.lines_kept,
         lines=chosen.lines,
         narrow=_share(rows["width"][np.isfinite(rows["width"])] < NARROW_PX),

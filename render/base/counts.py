@@ -41,6 +41,9 @@ DIRECT_SAMPLES = Quantity("samples")
 DIRECT_DROPPED = Quantity("dropped contributions of direct light")
 
 INDIRECT_ERROR = Quantity("relative error of reflections", "error")
+UNASKED_INDIRECT_ERROR = Quantity(
+    "relative error of reflections (not rendered to be known away from the line, by the goal in depth)", "error"
+)
 LIGHT_PATHS = Quantity("light paths")
 INDIRECT_DROPPED = Quantity("dropped contributions")
 INDIRECT_CLAMPED = Quantity("clamped contributions")

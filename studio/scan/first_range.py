@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from analysis.deviation import FAR, far_off
 from analysis.measures import robust_sigma
-from render.base.arrays import Float
+from render.base.arrays import Bool, Float
 from studio.scan.deviation import Compared
 from studio.scan.result_series import Series, symmetric_limit
 
@@ -16,6 +18,7 @@ BESIDE = 0.25
 """Of the true profile's size, room on either side of it."""
 OVER_TOLERANCE = 2.0
 Ends = tuple[float, float]
+Column = Literal["position", "depth", "distance"]
 
 
 def deviation_limit(made: Compared) -> float:
@@ -30,18 +33,29 @@ def deviation_limit(made: Compared) -> float:
 def profile_range(truth: Series | None, measured: list[Series]) -> tuple[Ends, Ends] | None:
     """mm, ends of `across` and of `distance`, of a profile: of the true one, and beside it as far as its points are;
     without one from percentile to percentile of the points. None: there is nothing to show a range of."""
-    exact = None if truth is None else np.isfinite(truth.distance)
-    if truth is None or exact is None or not exact.any():
-        across, distance = (_joined([getattr(one, name) for one in measured]) for name in ("across", "distance"))
-        here = np.isfinite(distance)
-        along, up = (_wider(values[here], BESIDE) if here.any() else None for values in (across, distance))
-        return None if along is None or up is None else (along, up)
-    index, across, distance = (values[exact] for values in (truth.index, truth.across, truth.distance))
-    spread = robust_sigma(_joined([one.distance - np.interp(one.index, index, distance) for one in measured]))
-    beside = BESIDE * float(np.ptp(across))
+    distance, exact = line_range("distance", truth, measured), _exact("distance", truth)
+    if truth is None or exact is None:
+        across = _of_most(_joined([one.across[np.isfinite(one.distance)] for one in measured]))
+    else:
+        across = _around(truth.across[exact], BESIDE * float(np.ptp(truth.across[exact])))
+    return None if across is None or distance is None else (across, distance)
+
+
+def line_range(name: Column, truth: Series | None, measured: list[Series]) -> Ends | None:
+    """Ends of one column of series, in its unit, as of `profile_range`. None: there is nothing to show a range of."""
+    exact = _exact(name, truth)
+    if truth is None or exact is None:
+        return _of_most(_joined([getattr(one, name) for one in measured]))
+    index, values = truth.index[exact], getattr(truth, name)[exact]
+    spread = robust_sigma(_joined([getattr(one, name) - np.interp(one.index, index, values) for one in measured]))
     # a flat part is as high as the spread of its points
-    above = max(BESIDE * float(np.ptp(distance)), FAR * spread if np.isfinite(spread) else 0.0)
-    return _around(across, beside), _around(distance, above)
+    return _around(values, max(BESIDE * float(np.ptp(values)), FAR * spread if np.isfinite(spread) else 0.0))
+
+
+def _exact(name: Column, truth: Series | None) -> Bool | None:
+    """(n,) where the true line has a value; None: it has none."""
+    exact = None if truth is None else np.isfinite(getattr(truth, name))
+    return None if exact is None or not exact.any() else exact
 
 
 def _around(values: Float, room: float) -> Ends:
@@ -52,8 +66,9 @@ def _joined(pieces: list[Float]) -> Float:
     return np.concatenate([np.zeros(0), *pieces])
 
 
-def _wider(values: Float, share: float) -> Ends | None:
-    """From percentile to percentile of finite values, and so much of it more on either side; None: all are alike."""
-    low, high = np.percentile(values, ENDS).tolist()
-    more = share * (high - low)
+def _of_most(values: Float) -> Ends | None:
+    """From percentile to percentile, and so much of it more on either side; None: there are none, or all are alike."""
+    values = values[np.isfinite(values)]
+    low, high = np.percentile(values, ENDS).tolist() if len(values) else (0.0, 0.0)
+    more = BESIDE * (high - low)
     return (low - more, high + more) if high > low else None

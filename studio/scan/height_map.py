@@ -14,6 +14,7 @@ from analysis.cloud import Cloud, merge, ply_pieces
 from analysis.deviation import far_off
 from analysis.height_map import HeightMap, encoded, height_map, within
 from analysis.report.units import digits
+from render.base.arrays import Bool
 from render.base.errors import InputError
 from render.base.files import atomic_write
 from render.base.finite import known
@@ -26,6 +27,8 @@ from studio.scan.scan_results import ScanResults
 FORMAT, VERSION = "blazer-heightmap", 1
 ENDS = (1.0, 99.0)
 """Percentiles of heights, where no errors are known."""
+GAP, GAP_IN_HEIGHT, LARGE = 8.0, 2.0, 95.0
+"""What parts stray points from a surface: usual distances of neighbours, their large steps in height, a percentile."""
 SUFFIXES = (".png", ".tif", ".tiff")
 NEEDED = ("x", "y", "z", "sigma_random", "correlation_length", "row", "laser", "step")
 SHADES = 1024
@@ -67,17 +70,45 @@ def write_height_map(points: Path, path: Path, pitch: float | None = None, *, al
 
 
 def file_range(points: Cloud) -> tuple[float, float] | None:
-    """m, from the lowest to the highest of the points that are not far off the surface, where their errors are known.
+    """m, from the lowest to the highest of the points that are of the surface, where their errors are known: of those
+    that are not far off it, and of what goes on from them without a gap, as a groove's bottom does.
 
     Else from percentile to percentile, and as much again on either side. None: nothing is to be left out.
     """
     heights, errors = points["z"], points.get("error_depth")
     if errors is not None and np.isfinite(errors).any():
-        near = heights[~far_off(errors) & np.isfinite(heights)]
-        return (float(near.min()), float(near.max())) if len(near) else None
+        kept = heights[_of_surface(points, ~far_off(errors) & np.isfinite(heights))]
+        return (float(kept.min()), float(kept.max())) if len(kept) else None
     heights = heights[np.isfinite(heights)]
     low, high = np.percentile(heights, ENDS).tolist() if len(heights) else (0.0, 0.0)
     return (2.0 * low - high, 2.0 * high - low) if high > low else None
+
+
+def _of_surface(points: Cloud, near: Bool) -> Bool:
+    """(n,) points that are near, and those beyond them in height that join them, one at a time, without a gap.
+
+    A gap is one of `GAP` usual distances on the map, or of `GAP_IN_HEIGHT` of the largest steps along the profile.
+    """
+    from scipy.spatial import cKDTree  # takes a while: not before a map is made
+
+    found, z = near.copy(), points["z"]
+    beside = near[1:] & near[:-1]
+    if not beside.any():
+        return found
+    across = np.hypot(np.diff(points["x"]), np.diff(points["y"]))[beside]
+    gaps = GAP * float(np.median(across)), GAP_IN_HEIGHT * float(np.percentile(np.abs(np.diff(z)[beside]), LARGE))
+    if not min(gaps) > 0.0:
+        return found
+    places = np.column_stack([points["x"] / gaps[0], points["y"] / gaps[0], z / gaps[1]])
+    low, high = z[near].min(), z[near].max()
+    # only what is beyond them makes the range larger, and only what is at its ends is next to that
+    apart = np.flatnonzero(~near & ((z < low) | (z > high)))
+    joined = np.flatnonzero(near & ((z < low + gaps[1]) | (z > high - gaps[1])))
+    while len(apart) and len(joined):
+        distance, _ = cKDTree(places[joined]).query(places[apart], p=np.inf, distance_upper_bound=1.0)
+        joined, apart = apart[np.isfinite(distance)], apart[~np.isfinite(distance)]
+        found[joined] = True
+    return found
 
 
 def read_points(points: Path) -> Cloud:

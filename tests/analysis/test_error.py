@@ -114,6 +114,28 @@ def test_what_the_calibration_moves_off_a_slanted_surface_is_the_spread_of_its_d
     assert np.all(told < points.sigma_systematic), "what moves along the surface counts for nothing"
 
 
+def test_false_rows_next_to_an_end_are_counted_apart_from_stray_ones():
+    """The one 230 scan lines away, 650 px beside the line, was told to be at its end."""
+    curve = wall_curve(np.arange(500, 900))
+    at, u = curve.position[0], np.full((2048, 2), np.nan)
+    u[497:903, 0] = at  # three scan lines beyond each end
+    u[270, 0] = at + 650.0
+    u[495, 0] = at + 650.0  # next to the end's scan line, not to the end
+    u[901, 1] = at + 300.0  # and beside one that is
+    _, errors = errors_of(line_of(u, 0.05), curve)
+    assert (errors.false_rows, errors.false_rows_at_ends) == (8, 5)
+
+
+def test_a_peak_whose_ray_gives_no_depth_is_a_false_row_and_no_point():
+    """It was counted nowhere."""
+    curve, u = wall_curve(np.arange(100, 200)), np.full((2048, 1), np.nan)
+    u[100:200, 0] = curve.position
+    u[1783, 0] = 100.0  # beyond the plane's vanishing line
+    points, errors = errors_of(line_of(u, 0.05), curve)
+    assert not points.valid[-1] and np.isnan(points.depth_z[-1])
+    assert (errors.false_rows, errors.false_rows_at_ends, errors.valid_rows) == (1, 0, 100)
+
+
 def test_coverage_tells_an_honest_sigma_from_a_boastful_one():
     random = np.random.default_rng(5)
     curve = wall_curve(np.arange(2048))

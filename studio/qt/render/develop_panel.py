@@ -6,9 +6,9 @@ import math
 import time
 from collections.abc import Callable
 from functools import partial
+from html import escape
 from typing import get_args
 
-import numpy as np
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QCloseEvent
 from PySide6.QtWidgets import (
@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 
 from analysis.line.settings import Method
 from analysis.report.colour import hex_colour, method_colour, method_name, wavelength_colour
-from analysis.report.units import percent
+from analysis.report.units import micrometres, percent
 from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.frame import Frame
@@ -39,6 +39,7 @@ from studio.qt.forms.log_field import LogField
 from studio.qt.image.line_overlay import swatch, ticked_swatch
 from studio.qt.render.automatic_exposure import filling
 from studio.runtime.jobs import Job, Progress
+from studio.scan.brightness import brightness
 from studio.scan.redevelop import Development, develop_again, development, measure_again
 from studio.scan.results import METHODS
 from studio.scan.stages import Measurement
@@ -298,7 +299,7 @@ class DevelopPanel(QWidget):
             images = develop_again(frame, how, noise=noise, cancelled=cancelled)
             seconds = time.perf_counter() - start
             blur = how.project.sensor.defocus_by(how.project.scene.camera.lens.model)
-            told = brightness(images, names) + (f"\ndefocus by {blur}" if blur != "nothing" else "")
+            told = brightness(images, names, frame) + (f"\ndefocus by {blur}" if blur != "nothing" else "")
             told += f"\n{OF_A_CELL}" if render.cell else ""
             render.noise = noise
             self._images_ready.emit(render, (frame, how), images, seconds, told)
@@ -363,13 +364,14 @@ class DevelopPanel(QWidget):
     def _tell_measures(self, found: dict[str, list[Measurement]]) -> None:
         small = f" at {self._told_of.scanner_scale:.3g} x" if self._told_of and self._told_of.scanner_scale != 1 else ""
         rows = [f"<tr><th align='left'>RMSE{small}&nbsp;</th><th>px</th><th>depth</th><th>rows</th></tr>"]
+        lasers = [laser.name for laser in self._told_of.project.scene.lasers] if self._told_of else []
         for method, by_laser in found.items():
             for item in by_laser:
-                name = method_name(method) + (f", {item.laser + 1}" if len(by_laser) > 1 else "")
-                u, depth = item.errors.u.rmse, item.errors.depth_z.rmse
+                name = method_name(method) + (f", {escape(lasers[item.laser])}" if len(by_laser) > 1 else "")
+                u, depth = item.errors.u.rmse, micrometres(item.errors.depth_z.rmse)
                 rows.append(
                     f"<tr><td><span style='color:{method_colour(method)}'>&#9632;</span> {name}&nbsp;&nbsp;</td>"
-                    f"<td align='right'>{u:.3f}&nbsp;&nbsp;</td><td align='right'>{1e6 * depth:.1f} µm&nbsp;&nbsp;</td>"
+                    f"<td align='right'>{u:.3f}&nbsp;&nbsp;</td><td align='right'>{depth}&nbsp;&nbsp;</td>"
                     f"<td align='right'>{percent(item.errors.completeness)}</td></tr>"
                 )
         self.table.setText(f"<table cellspacing='2'>{''.join(rows)}</table>")
@@ -383,14 +385,3 @@ class DevelopPanel(QWidget):
         if job.problem is not None:
             self.session.message.emit("error", job.problem.text)
             one_of(FiguresAge, self.session).give_up()
-
-
-def brightness(images: list[Image], names: list[str]) -> str:
-    """The brightest pixel of each image, be it the line's or not, and how much of it is saturated."""
-    lines = []
-    for image, name in zip(images, names or [""], strict=True):
-        top, full = int(image.pixels.max()), float(np.mean(image.pixels >= image.saturation))
-        saturated = f", {full:.2%} of the pixels saturated" if full > 0.0 else ""
-        prefix = f"{name}: " if len(images) > 1 else ""
-        lines.append(f"{prefix}brightest pixel of all {top} DN, {top / image.saturation:.0%} of full{saturated}")
-    return "\n".join(lines)

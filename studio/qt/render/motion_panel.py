@@ -294,7 +294,7 @@ def share(stage: str, done: float) -> float | None:
 def describe(motion: object, step: int) -> str:
     """Where a step stands, for a person."""
     if isinstance(motion, LinearStage):
-        x, y, z = (1e3 * step * value for value in motion.step)
+        x, y, z = (round(1e3 * step * value, 2) + 0.0 for value in motion.step)  # no -0.00
         return f"{motion.moves} moved by ({x:.2f}, {y:.2f}, {z:.2f}) mm"
     if isinstance(motion, Turntable):
         import math

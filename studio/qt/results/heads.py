@@ -12,6 +12,7 @@ STOPPED = "This render was stopped early: light is missing, and the figures are 
 AWAITED = "The render goes on: figures come with ambient light, without whose noise they would be too good."
 REFINING = "The render goes on: light is still to come, and these are the figures so far."
 MEASURING = "Measuring… until then these are the figures of the settings before."
+UNMEASURED = "This step's points are still to come: a scan's steps are measured as they stand, not while they play."
 CHANGED = "The scene has changed since: these are the figures of the render as it was."
 MEASURED_OTHERWISE = (
     "Measure > Measure the scan again: figures of all steps are as they were measured, and sensor, extraction or "
@@ -32,6 +33,8 @@ def heads(session: Session, step_problem: str) -> list[str]:
         told.append(f"Cell of a study: {render.name}. Your own renders are in the list of the Render workspace.")
     elif session.stale and (render.scan is None or render.frame.step == session.step):
         told.append(CHANGED)
+    if not render.measurements and render.scan is not None and render.scan.measured:
+        told.append(UNMEASURED)
     if measured_otherwise(session, render):
         told.append(MEASURED_OTHERWISE)
     if not render.final:

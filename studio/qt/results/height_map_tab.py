@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QTimer
-from PySide6.QtGui import QShowEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
@@ -64,7 +64,9 @@ REST_MS = 400
 BAR_TIP = "Drag an end to another value; a double click brings back what was there. Right click: percentiles, mm or µm"
 BAR_PX = 136
 """Beside the picture, for its colour bar."""
-LEAST_PX, TOLD_PX = 300, 240
+LEAST_PX, TOLD_PX = 360, 240
+PROFILE_PX = 152
+"""Height of the profile at which its axis has room for its name, and for more than one number."""
 
 
 class HeightMapTab(QWidget):
@@ -111,6 +113,7 @@ class HeightMapTab(QWidget):
         self.graph = pg.GraphicsLayoutWidget()
         self.plot = plots.new_plot("Along the line / mm", "Height", "mm")
         self.graph.addItem(self.plot)
+        self.graph.setMinimumHeight(PROFILE_PX)
         self.profile = plots.curve(method_colour("likelihood"))
         self.plot.addItem(self.profile)
         self.read = ElidedLabel()
@@ -157,6 +160,14 @@ class HeightMapTab(QWidget):
         super().showEvent(event)
         if self.made is None:
             self._rest.start(0)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._make_room()
+
+    def _make_room(self) -> None:
+        """A layout knows of a text's lines only where it is as wide as it asks for: else it lies over the profile."""
+        self.told.setMinimumHeight(max(0, self.told.heightForWidth(self.told.width())))
 
     def make(self) -> None:
         """In the background; the last pitch counts."""
@@ -230,6 +241,7 @@ class HeightMapTab(QWidget):
             texts.append(steep_sentence(steep_record(made)))
             texts.append(sigma_sentence(sigma_record(made, encoded(made.heights)[1])).replace(" um", " µm"))
         self.told.setText("\n".join(filter(None, texts)))
+        self._make_room()
 
     def _draw(self) -> None:
         if self.made is None:

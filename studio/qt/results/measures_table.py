@@ -18,7 +18,7 @@ HONEST = 88.0
 EXPLAINED = {
     "Points": "Points measured.",
     "Completeness": "Share of the scan lines on which the line can be seen that have a point of it, and no outlier.",
-    "False scan lines": "Scan lines with a point although no line is to be seen there.",
+    "False scan lines": "Scan lines with a point although no line is to be seen there, also one without depth.",
     "Bias": "Mean error: what averaging does not remove.",
     UNCERTAINTY: "Twice the standard deviation of the bias, as neighbouring scan lines err alike: a smaller one may be "
     "chance.",
@@ -33,6 +33,8 @@ EXPLAINED = {
 }
 
 ROW_PX = 22
+MOST_UM = 1e4
+"""From which on a row is in mm."""
 MOST_OF_ALL = 99.9
 """%, in three digits."""
 
@@ -41,6 +43,13 @@ def shown(value: float, unit: str = "") -> str:
     """Three digits, or all of a whole number; a share that is not all of it is never rounded up to 100 %."""
     value = min(value, MOST_OF_ALL) if unit == "%" and value < 100.0 else value
     return "-" if math.isnan(value) else f"{value:.0f}" if value == round(value) else digits(value)
+
+
+def readable(name: str, unit: str, values: list[float]) -> tuple[str, str, list[float]]:
+    """A row as it is shown: in mm where a length has more than four digits in um."""
+    if unit == "µm" and any(abs(value) >= MOST_UM for value in values):
+        return name, "mm", [1e-3 * value for value in values]
+    return name, unit, values
 
 
 class ReadOnlyTable(QTableWidget):
@@ -83,7 +92,7 @@ class MeasuresTable(ReadOnlyTable):
     def show_measures(self, methods: list[str], rows: list[tuple[str, str, list[float]]]) -> None:
         """rows: name, unit, and a value for each method, NaN where there is none."""
         self.show_methods(methods, len(rows))
-        for row, (name, unit, values) in enumerate(rows):
+        for row, (name, unit, values) in enumerate(readable(*one) for one in rows):
             heading = QTableWidgetItem(f"{name} / {unit}" if unit else name)
             heading.setToolTip(f"<p>{EXPLAINED[name]}</p>")
             self.setVerticalHeaderItem(row, heading)

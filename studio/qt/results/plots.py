@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF
 
+from analysis.report.units import counted
+from render.base.arrays import Float
 from studio.qt.core import theme
 
 pg.setConfigOptions(antialias=False)
@@ -112,6 +115,29 @@ class WholeAxis(pg.AxisItem):  # type: ignore[misc]
     def tickSpacing(self, minVal: float, maxVal: float, size: float) -> list[tuple[float, float]]:
         found = super().tickSpacing(minVal, maxVal, size)
         return [(float(spacing), 0.0) for spacing, _ in found if spacing >= 1.0] or [(1.0, 0.0)]
+
+
+class OutsideNote(pg.LabelItem):  # type: ignore[misc]
+    """In a plot's corner: how many of its stray points lie above or below what it shows."""
+
+    def __init__(self, plot: pg.PlotItem) -> None:
+        super().__init__("", size="8pt")
+        self.plot = plot
+        self._stray: Float = np.zeros(0)
+        self.setParentItem(plot.vb)
+        self.anchor(itemPos=(1, 0), parentPos=(1, 0), offset=(-4, 0))
+        plot.vb.sigYRangeChanged.connect(self.tell)
+
+    def show_of(self, values: Float, ends: tuple[float, float] | None) -> None:
+        """Of values along y, which are stray beyond ends; None: none is."""
+        low, high = ends or (-math.inf, math.inf)
+        self._stray = values[(values < low) | (values > high)]
+        self.tell()
+
+    def tell(self) -> None:
+        low, high = self.plot.vb.viewRange()[1]
+        count = int(np.count_nonzero((self._stray < low) | (self._stray > high)))
+        self.setText(counted(count, "point") + " outside" if count else "", color=theme.colours().muted)
 
 
 class PointedPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]

@@ -43,7 +43,7 @@ from studio.qt.results.results_profile import ProfilePlot
 from studio.qt.results.results_rows import RowPlots
 from studio.qt.results.results_steps import StepsPlot
 from studio.qt.results.scan_bar import ScanBar
-from studio.qt.results.scan_line_reading import reading
+from studio.qt.results.scan_line_reading import NOTHING, UNMEASURED, reading
 from studio.scan.region import Box, Region, scan_errors
 from studio.scan.remarks import frame_remarks, scale_notes
 from studio.scan.result_series import ERROR_VIEWS, ErrorView, error_values, measured_series, table, true_series
@@ -265,7 +265,9 @@ class ResultsPanel(QWidget):
         scan_line, shown, view = self.session.hovered, self.shown(), self.view
         self.rows.mark(scan_line)
         self.profile.mark(scan_line)
-        text, first = reading(scan_line, shown, view, "" if self.scan_lines is None else self.scan_lines[0])
+        axis = "" if self.scan_lines is None else self.scan_lines[0]
+        render = self.session.shown
+        text, first = reading(scan_line, shown, view, axis, NOTHING if render and render.measurements else UNMEASURED)
         self.histogram.mark(first)
         self.reading.setText(text)
 

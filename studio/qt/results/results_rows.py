@@ -12,6 +12,7 @@ from analysis.report.colour import TRUTH, method_colour
 from render.base.arrays import Float
 from studio.qt.core import theme
 from studio.qt.results import plots
+from studio.scan.first_range import Column, line_range
 from studio.scan.result_series import ErrorView, Series, symmetric_limit
 
 PLOTTED = 99.5
@@ -36,6 +37,7 @@ class RowPlots(plots.PointedPlots):
         self.rings = [plots.ring() for _ in self.plots]
         for plot, ring in zip(self.plots, self.rings, strict=True):
             plot.addItem(ring, ignoreBounds=True)
+        self.outside = [plots.OutsideNote(plot) for plot in (self.position, self.depth)]
         self._drawn: list[tuple[pg.PlotItem, Any]] = []
         self._shown: dict[str, tuple[Series, Float]] = {}
         self.limit = 1.0
@@ -67,10 +69,22 @@ class RowPlots(plots.PointedPlots):
             off = np.abs(error) > limit
             marks = series.index[off], np.sign(error[off]) * limit
             self._add(self.error, plots.crosses(method_colour(method))).setData(*marks)
-        for plot in self.plots:
-            plot.enableAutoRange()
+        self._fit(truth, [series for series, _ in measured.values()])
         self.error.setYRange(-limit, limit, padding=0.06)
         self.mark(None)
+
+    def _fit(self, truth: Series | None, measured: list[Series]) -> None:
+        """To the line: one stray point would make it flat. A double click shows those outside too."""
+        for plot in self.plots:
+            if self.count is not None:
+                plot.vb.setLimits(xMin=-0.5, xMax=self.count - 0.5)
+            plot.enableAutoRange()
+        names: tuple[Column, Column] = ("position", "depth")
+        for note, name in zip(self.outside, names, strict=True):
+            ends = line_range(name, truth, measured)
+            if ends is not None and ends[1] > ends[0]:
+                note.plot.setYRange(*ends, padding=0.0)
+            note.show_of(np.concatenate([np.zeros(0), *(getattr(one, name) for one in measured)]), ends)
 
     def mark(self, scan_line: int | None) -> None:
         """Put the cursor on a scan line, and a ring around its samples."""
@@ -98,6 +112,8 @@ class RowPlots(plots.PointedPlots):
         for ring in self.rings:
             ring.setPen(pg.mkPen(c.text, width=1.5))
         self.zero.setPen(pg.mkPen(c.muted, width=1))
+        for note in self.outside:
+            note.tell()
         self.paint_range()
 
     def _add(self, plot: pg.PlotItem, item: Any) -> Any:

@@ -9,14 +9,25 @@ import numpy as np
 
 from analysis.report.colour import method_colour
 from analysis.report.units import digits
+from analysis.triangulate import PointFlag
 from studio.scan.result_series import ErrorView, error_values
 from studio.scan.stages import Measurement
 
+NO_DEPTH = {
+    PointFlag.NO_RAY: "no depth: the lens has no ray there",
+    PointFlag.NEAR_PARALLEL: "no depth: the ray runs along the laser's plane",
+    PointFlag.BEHIND: "no depth: the ray does not meet the laser's plane",
+}
+NOTHING, UNMEASURED = "no point", "not measured yet"
+
 
 def reading(
-    scan_line: int | None, shown: Mapping[str, Measurement], view: ErrorView, axis: str
+    scan_line: int | None, shown: Mapping[str, Measurement], view: ErrorView, axis: str, nothing: str = NOTHING
 ) -> tuple[str, float | None]:
-    """Rich text, and the first method's error in the view's unit; shown: by method. Of None: nothing."""
+    """Rich text, and the first method's error in the view's unit; shown: by method. Of None: nothing.
+
+    nothing: what is said where no method has a peak.
+    """
     if scan_line is None:
         return "", None
     parts, first = [], None
@@ -25,7 +36,8 @@ def reading(
             error, depth = float(error_values(one.errors, view)[i]), 1e3 * float(one.points.depth_z[i])
             known = math.isfinite(error)
             said = f"{'+' if error > 0 else ''}{digits(error)} {view.unit}" if known else "no truth here"
-            parts.append(f"<span style='color:{method_colour(method)}'>●</span> {depth:.3f} mm ({said})")
+            told = NO_DEPTH.get(PointFlag(one.points.flag[i]), f"{depth:.3f} mm ({said})")
+            parts.append(f"<span style='color:{method_colour(method)}'>●</span> {told}")
             first = error if first is None and known else first
     name = "Column" if axis == "columns" else "Row"
-    return f"<b>{name} {scan_line}</b>&nbsp;&nbsp; {'&nbsp;&nbsp; '.join(parts) or 'no point'}", first
+    return f"<b>{name} {scan_line}</b>&nbsp;&nbsp; {'&nbsp;&nbsp; '.join(parts) or nothing}", first

@@ -56,3 +56,16 @@ def test_one_false_row_is_told_as_one() -> None:
     found = total(report_of(scene, frames).record.chosen())
     for count, told in ((1, "1 false scan line carries a point"), (2, "2 false scan lines carry a point")):
         assert any(text.startswith(told) for text in remarks(dataclasses.replace(found, false_rows=count)))
+
+
+def test_false_rows_are_said_to_be_at_an_end_only_where_they_are() -> None:
+    """One of five was 230 scan lines from the end of the line that all were told to be at."""
+    scene, frames = make_frames(steps=STEPS)
+    found = total(report_of(scene, frames).record.chosen())
+    for at_ends, told in (
+        (5, "centre: 5 next to an end of the line."),
+        (4, "centre: 4 next to an end of the line and 1 away from it, of stray light or noise alone."),
+        (0, "centre, of stray light or noise alone."),
+    ):
+        said = " ".join(remarks(dataclasses.replace(found, false_rows=5, false_rows_at_ends=at_ends)))
+        assert told in said and said.count("end of the line") == (at_ends > 0)

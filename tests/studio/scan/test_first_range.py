@@ -38,11 +38,36 @@ def test_heights_are_those_of_the_part() -> None:
     heights = np.concatenate([np.linspace(0.0, 0.031, 900), np.full(100, -0.0695)])
     errors = np.concatenate([RANDOM.normal(0.0, 1e-5, 900), np.full(50, 0.07), np.full(50, np.nan)])
     made = HeightMap(heights[None], 0.0, 0.0, 1e-3, len(heights), 1e-5, 1e-5, 0.0)
-    kept = within(made, file_range({"z": heights, "error_depth": errors}))
+    across = np.concatenate([np.arange(900.0), 9.0 * np.arange(100.0)])
+    kept = within(made, file_range({"x": across, "y": 0.0 * across, "z": heights, "error_depth": errors}))
     assert shown_range(kept) == (0.0, 0.031) and kept.heights.shape == (1, 900)
     assert shown_range(made) == (-0.0695, 0.031)
     level = HeightMap(np.zeros((1, 4)), 0.0, 0.0, 1e-3, 4, 1e-5, 1e-5, 0.0)
     assert shown_range(level) is None
+
+
+def test_the_bottom_of_a_groove_is_no_stray_although_its_points_err() -> None:
+    """At -19.68 mm the map of a groove of 20 mm ended, and its profile had gaps."""
+    across = np.tile(0.25e-3 * np.arange(-300.0, 301.0), 4)
+    heights = np.minimum(np.abs(across) - 0.02, 0.0)
+    errors = RANDOM.normal(0.0, 1e-5, len(across))
+    errors[heights < -0.01968] = 4e-4
+    cloud = {"x": across, "y": np.repeat(1e-3 * np.arange(4.0), 601), "z": heights, "error_depth": errors}
+    assert file_range(cloud) == (-0.02, 0.0)
+    strays = {12: -0.0215, 700: 0.0012, 900: -0.8, 901: -0.8, 902: -0.8}
+    for i, height in strays.items():
+        heights[i], errors[i] = height, np.nan
+    assert file_range(cloud) == (-0.02, 0.0), "what is apart from the surface by a gap is stray"
+
+
+def test_above_a_flat_part_a_gap_is_small() -> None:
+    """A millimetre over a plate is far, however near that is to the plate's points beside it."""
+    across = np.tile(0.25e-3 * np.arange(400.0), 4)
+    heights = RANDOM.normal(0.0, 1e-5, len(across))
+    errors = heights.copy()
+    heights[50], errors[50] = 1e-3, np.nan
+    ends = file_range({"x": across, "y": np.repeat(1e-3 * np.arange(4.0), 400), "z": heights, "error_depth": errors})
+    assert ends is not None and ends[1] < 6e-5
 
 
 def test_a_profile_is_as_large_as_the_true_one() -> None:

@@ -11,10 +11,11 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QIcon
 
 from analysis.gauges.gauge import Gauge
+from studio.project.document import replaced
 from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import one_of
-from studio.qt.render.develop_panel import DevelopPanel, brightness
+from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.results.heads import AWAITED, MEASURING, REFINING, heads
 from studio.scan.redevelop import development
 from tests.studio.qt.small_session import small_session
@@ -55,6 +56,17 @@ def test_a_shown_render_is_developed_and_measured_by_every_method(panel):
     assert set(render.measurements) == {"likelihood", "gaussian", "centre_of_mass"}
     assert render.images[0].pixels.shape == render.frame.shape
     assert "µm" in panel.table.text() and "DN" in panel.told.text()
+
+
+def test_of_several_lasers_each_has_its_name(panel):
+    """They stood there as "likelihood, 1" and "likelihood, 2"."""
+    render = panel.session.shown
+    laser = render.project.scene.lasers[0]
+    two = replaced(render.project, ("scene", "rig", "lasers"), (laser, laser.model_copy(update={"name": "left <2>"})))
+    panel._told_of = replace(render, project=two)
+    (one,) = render.measurements["likelihood"]
+    panel._tell_measures({"likelihood": [one, replace(one, laser=1)]})
+    assert f", {laser.name}&nbsp;" in panel.table.text() and ", left &lt;2&gt;&nbsp;" in panel.table.text()
 
 
 def test_typing_half_the_exposure_halves_the_electrons_without_rendering(qtbot, panel):
@@ -187,7 +199,7 @@ def test_one_click_exposes_by_the_render_and_is_one_step_to_undo(qtbot, panel):
     with qtbot.waitSignal(session.measured, timeout=20000):
         qtbot.mouseClick(panel.automatic_exposure, Qt.MouseButton.LeftButton)
     assert "peaks, without noise and glints, are aimed at 70% of full scale, by Render 1" in told[-1]
-    assert "brightest pixel of all " in brightness(list(session.shown.images), [""]), "not the line alone"
+    assert "brightest pixel of all " in panel.told.text(), "not the line alone"
     time = session.project.sensor.exposure_time
     assert time != before and session.document.undo_label == "automatic exposure"
     settle(qtbot, panel)

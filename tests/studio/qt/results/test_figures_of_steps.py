@@ -16,7 +16,7 @@ from studio.project.project import Project
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.render.develop_panel import DevelopPanel
-from studio.qt.results.heads import CHANGED, MEASURED_OTHERWISE
+from studio.qt.results.heads import CHANGED, MEASURED_OTHERWISE, UNMEASURED
 from studio.qt.results.results_panel import PART, ResultsPanel
 from studio.scan.gauging import measures_record, step_readings
 from studio.scan.options import ScanOptions
@@ -139,3 +139,16 @@ def test_what_stands_above_the_figures_is_seen_whole(panel: ResultsPanel, qtbot:
     qtbot.waitUntil(lambda: label.height() >= label.heightForWidth(label.width()) > 0)
     assert label.width() >= max(label.fontMetrics().horizontalAdvance(word) for word in label.text().split())
     assert panel.rect().contains(label.mapTo(panel, label.rect().bottomRight()))
+
+
+def test_a_step_that_plays_past_says_that_its_points_are_to_come(panel: ResultsPanel, qtbot: QtBot) -> None:
+    """Its charts had the true line alone, and said "no point" of scan lines that have one."""
+    session = panel.session
+    with qtbot.waitSignal(session.renders_changed):
+        session.look_at_step(1)
+    assert session.shown is not None and not session.shown.measurements
+    session.hover(40)
+    assert UNMEASURED in panel.head_text.text() and "not measured yet" in panel.reading.text()
+    with qtbot.waitSignal(session.measured, timeout=20_000):
+        pass
+    assert UNMEASURED not in panel.head_text.text() and "not measured yet" not in panel.reading.text()

@@ -109,6 +109,17 @@ def test_the_mouse_reads_a_cell_and_the_line_its_profile(tab: HeightMapTab) -> N
     assert distance[-1] == pytest.approx(made.pitch * np.hypot(columns - 1, rows - 1))
 
 
+def test_in_little_room_nothing_lies_over_the_profile_and_its_axes_can_be_read(tab: HeightMapTab, qtbot: QtBot) -> None:
+    """The text below was printed over "Along the line / mm", and heights had one number and no name."""
+    tab.resize(400, 200)
+    qtbot.waitUntil(lambda: tab.height() == tab.minimumSizeHint().height())
+    qtbot.wait(50)
+    assert tab.split.geometry().bottom() < tab.read.geometry().top()
+    assert tab.read.geometry().bottom() < tab.told.geometry().top()
+    assert tab.told.height() >= tab.told.heightForWidth(tab.told.width())
+    assert tab.graph.height() <= tab.split.sizes()[1] and tab.plot.getAxis("left").label.isVisible()
+
+
 def test_a_difference_of_heights_says_between_which_places_it_is(tab: HeightMapTab) -> None:
     """Heights 72 mm apart were told as those of the ends of a line of 120 mm."""
     distance = np.linspace(0.0, 0.12, 121)

@@ -21,6 +21,7 @@ from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.render.history import History
 from studio.qt.render.render_panel import RenderPanel
 from studio.qt.results.heads import CHANGED, STOPPED
+from studio.qt.results.measures_table import MeasuresTable
 from studio.qt.results.readout_panel import ReadoutPanel
 from studio.qt.results.results_panel import ResultsPanel
 from studio.scan.stages import scaled
@@ -160,6 +161,17 @@ def test_results_explain_what_lies_within_two_sigma(qtbot: QtBot) -> None:
     assert ("predicted sigma" in said) == low
     panel.close()
     develop.close()
+
+
+def test_large_errors_are_told_in_mm(qtbot: QtBot) -> None:
+    """An RMSE of 0.8 m stood there as 789531 um."""
+    made = MeasuresTable()
+    qtbot.addWidget(made)
+    made.show_measures(
+        ["likelihood"], [("RMSE", "µm", [789531.0]), ("Bias", "µm", [-9999.0]), ("Points", "", [20000.0])]
+    )
+    told = {made.verticalHeaderItem(i).text(): made.item(i, 0).text() for i in range(3)}
+    assert told == {"RMSE / mm": "790", "Bias / µm": "-9999", "Points": "20000"}
 
 
 @pytest.fixture

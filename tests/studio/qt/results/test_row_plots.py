@@ -36,6 +36,32 @@ def test_points_beyond_the_axis_are_crosses_at_its_ends(plots: RowPlots) -> None
     assert low < -plots.limit and plots.limit < high < 100.0
 
 
+def groove() -> Series:
+    return Series(ROWS, 1200.0 + np.abs(ROWS - 250.0), 850.0 - 0.08 * np.abs(ROWS - 250.0), ROWS, ROWS)
+
+
+def test_a_stray_point_leaves_the_line_as_high_as_the_charts_and_is_told(plots: RowPlots) -> None:
+    """One dot of noise stretched the axis to 2500 px, on which a groove was flat."""
+    true, seen = groove(), groove()
+    seen.position[:2], seen.depth[:2] = (2450.0, 30.0), (np.nan, 675.0)
+    plots.show_series("rows", true, {"likelihood": (seen, np.zeros(len(ROWS)))}, ERROR_VIEWS[0])
+    (low, high), (near, far) = (plot.vb.viewRange()[1] for plot in (plots.position, plots.depth))
+    assert 1100.0 < low < 1200.0 and 1450.0 < high < 1550.0 and 820.0 < near < 830.0 and 850.0 < far < 860.0
+    assert [note.text for note in plots.outside] == ["2 points outside", "1 point outside"]
+    for plot in plots.plots:  # as by a double click
+        plot.enableAutoRange()
+        plot.vb.updateAutoRange()
+    assert plots.position.vb.viewRange()[1][1] > 2450.0 and [note.text for note in plots.outside] == ["", ""]
+
+
+def test_charts_are_not_zoomed_beyond_the_rows_of_the_image(plots: RowPlots) -> None:
+    plots.count = len(ROWS)
+    plots.show_series("rows", groove(), {}, ERROR_VIEWS[0])
+    plots.error.vb.scaleBy((10.0, 1.0))
+    low, high = plots.error.vb.viewRange()[0]
+    assert (low, high) == (-0.5, len(ROWS) - 0.5)
+
+
 def test_the_ring_of_such_a_row_is_about_its_cross(plots: RowPlots) -> None:
     plots.mark(100)
     assert plots.rings[-1].getData()[1].tolist() == [-plots.limit]

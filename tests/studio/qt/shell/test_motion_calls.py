@@ -101,3 +101,9 @@ def test_no_folder_is_asked_for_and_made_while_something_is_rendered(
         window.runner.cancel(RENDER)
     window.commands["scan"].trigger()
     assert len(asked) == 1
+
+
+def test_a_step_that_moves_by_nothing_has_no_sign() -> None:
+    """There stood "moved by (-0.00, 4.00, 0.00) mm"."""
+    told = motion_panel.describe(LinearStage(step=(-1e-9, 0.002, 0.0), steps=3), 2)
+    assert told.endswith(" moved by (0.00, 4.00, 0.00) mm")
