@@ -166,8 +166,8 @@ def _peak(r: Readouts) -> Row:
 
 def _saturation(r: Readouts) -> Row:
     help = (
-        "Share of the scan lines whose brightest pixel exceeds the full well, by speckle too where the sensor's is "
-        "switched on; shorten the exposure, or lower the power."
+        "Expected share of the scan lines whose brightest pixel exceeds the full well: shot and read noise decide it, "
+        "and speckle where the sensor's is switched on. Shorten the exposure, or lower the power."
     )
     if r.saturated is None or r.peak_electrons is None:
         return Row("saturated", "Saturated", NOTHING, "", "", help)

@@ -15,12 +15,15 @@ from render.camera.camera import Camera
 from studio.preview import estimates
 from studio.preview.inspection import working_range
 from studio.preview.preview import Look
-from studio.preview.scintillation import brightest, saturated_share, speckle_px
+from studio.preview.saturation import brightest, full_electrons, saturated_lines
+from studio.preview.scintillation import speckle_px
 
 RARE = 0.005
 """Share of the scan lines that an exposure may leave saturated by speckle."""
 SPECKLED = 64
 """Places along the line at which the effect of speckle is worked out."""
+FILLED_PLACES = 128
+"""The same of what saturates, which depends on where within a pixel the line falls."""
 
 
 GOOD_PX = 0.05
@@ -53,6 +56,7 @@ class Readouts:
     sharp_farthest: float
     """Depths between which the blur disc is at most `estimates.SHARP_PX`; inf: no end."""
     full_well: float
+    """e- that a pixel tells of at most, by its well or by its highest number."""
     occluded: float | None
     """Share of the line within the image that the camera cannot see."""
     scan_lines: int
@@ -70,7 +74,8 @@ class Readouts:
     peak_electrons: Range | None = None
     """Of the brightest pixel of a scan line, before saturation."""
     saturated: float | None = None
-    """Share of the scan lines that are hit, with the sensor's speckle."""
+    """Expected share of the scan lines that are hit whose brightest pixel saturates, by shot and read noise, and the
+    sensor's speckle."""
     brightest: float = 1.0
     """Times its mean that speckle makes a pixel's laser light on RARE of the scan lines; 1 without speckle."""
     ambient_electrons: float | None = None
@@ -120,7 +125,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         sharp_nearest=sharp[0],
         sharp_farthest=sharp[1],
         blurs_images=sensor.defocus_by(camera.lens.model) != "nothing",
-        full_well=sensor.full_well,
+        full_well=full_electrons(sensor),
         occluded=look.fan(laser).occluded,
         scan_lines=camera.height if rows else camera.width,
         scan_lines_hit=len(hit),
@@ -138,9 +143,8 @@ def readouts(look: Look, laser: int) -> Readouts:
     some = np.unique(np.linspace(0, len(width) - 1, SPECKLED).astype(int))
     shown = width[some], curve.position[some], amplitude[some], ambient[some]
     speckle = speckle_px(camera, source.wavelength_nm, *shown, read, sensor.speckle == "depolarised")
-    saturated = len(np.unique(curve.index[peak > sensor.full_well])) / len(hit)
-    if sensor.speckle != "off":
-        saturated = float(np.mean(saturated_share(sensor, camera, source.wavelength_nm, *shown)))
+    many = np.unique(np.linspace(0, len(width) - 1, FILLED_PLACES).astype(int))
+    lines = width[many], curve.position[many], amplitude[many], ambient[many]
     return replace(
         known,
         triangulation_angle=_range(triangulation_angles(curve.point, T_camera_laser[:3, 3])),
@@ -149,7 +153,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         along_per_px=_range(np.linalg.norm(estimates.resolution(camera, plane, pixels, along), axis=1)),
         width_px=_range(width),
         peak_electrons=_range(peak),
-        saturated=saturated,
+        saturated=float(np.mean(saturated_lines(sensor, camera, source.wavelength_nm, *lines))),
         brightest=brightest(sensor, camera, source.wavelength_nm, RARE),
         ambient_electrons=float(np.median(ambient)),
         blur_px=_range(estimates.blur_px(camera, curve.point)),

@@ -390,7 +390,7 @@ def brightness(images: list[Image], names: list[str]) -> str:
     lines = []
     for image, name in zip(images, names or [""], strict=True):
         top, full = int(image.pixels.max()), float(np.mean(image.pixels >= image.saturation))
-        saturated = f", {full:.2%} of the pixels saturated" if full > 0.0 else ""
+        saturated = f", {full:.2%} of the image's pixels saturated" if full > 0.0 else ""
         prefix = f"{name}: " if len(images) > 1 else ""
         lines.append(f"{prefix}brightest pixel of all {top} DN, {top / image.saturation:.0%} of full{saturated}")
     return "\n".join(lines)
