@@ -78,8 +78,12 @@ class Readouts:
     sensor's speckle."""
     brightest: float = 1.0
     """Times its mean that speckle makes a pixel's laser light on RARE of the scan lines; 1 without speckle."""
+    laser_electrons: float | None = None
+    """What of the brightest pixel is the laser's light, median."""
     ambient_electrons: float | None = None
     """Background of ambient light and dark current, unshadowed, median."""
+    detected: float | None = None
+    """Response of the extraction's detection to the line over the least that counts as one, median."""
     blur_px: Range | None = None
     """Diameter of the blur disc along the lit line."""
     blurs_images: bool = True
@@ -137,8 +141,10 @@ def readouts(look: Look, laser: int) -> Readouts:
     width = estimates.line_width_px(camera, source, T_camera_laser, lit.normal, curve.point, pixels, rows)
     ambient = estimates.ambient_electrons(look, lit, pixels) + sensor.dark_current * sensor.exposure_time
     amplitude = estimates.line_electrons(camera, source, sensor, lit, pixels)
-    peak = amplitude * estimates.pixel_share(curve.position, width) + ambient
+    light = amplitude * estimates.pixel_share(curve.position, width)
+    peak = light + ambient
     read = estimates.read_variance(sensor)
+    response = estimates.detection_response(amplitude, width, ambient, read)
     bound = estimates.centre_bound_px(amplitude, width, ambient, read)
     some = np.unique(np.linspace(0, len(width) - 1, SPECKLED).astype(int))
     shown = width[some], curve.position[some], amplitude[some], ambient[some]
@@ -155,7 +161,9 @@ def readouts(look: Look, laser: int) -> Readouts:
         peak_electrons=_range(peak),
         saturated=float(np.mean(saturated_lines(sensor, camera, source.wavelength_nm, *lines))),
         brightest=brightest(sensor, camera, source.wavelength_nm, RARE),
+        laser_electrons=_median(light),
         ambient_electrons=float(np.median(ambient)),
+        detected=_median(response / look.project.extraction.threshold),
         blur_px=_range(estimates.blur_px(camera, curve.point)),
         photon_sigma=_median(bound * depth),
         speckle_sigma=_median(speckle * depth[some]),
