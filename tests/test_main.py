@@ -204,6 +204,13 @@ class TestNew:
         answer = json.loads(call("inspect", made["project"], "--json").stdout)
         assert answer["ok"] and answer["lasers"][0]["scan_lines_hit"] > 1900
 
+    def test_an_exposure_is_told_to_its_last_digit(self, tmp_path: Path) -> None:
+        made = Path(json.loads(call("new", "plane", tmp_path / "p", "--json").stdout)["project"])
+        project = json.loads(made.read_text())
+        project["sensor"]["exposure_time"] = 0.001755
+        made.write_text(json.dumps(project))
+        assert "exposure 1.755 ms" in call("inspect", made).stdout
+
     def test_nothing_is_overwritten_without_force(self, tmp_path: Path) -> None:
         assert call("new", "plane", tmp_path).exit_code == 0
         (tmp_path / "project.json").write_text("mine")

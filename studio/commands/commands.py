@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from render.base.errors import InputError
 from studio.commands.places import OUTPUT, check_output, chosen_file, folder_name, load_project, never
+from studio.editing.units import Unit
 from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, new_project
 from studio.runtime.console import print_plan, print_table, stage_progress
@@ -314,7 +315,7 @@ def _project_rows(project: Project, found: Inspection) -> list[tuple[str, str]]:
                    f"f/{camera.lens.f_number:g}, {camera.pixel_pitch * 1e6:.2f} um pixels"),
         ("lens", f"focused {'far away' if focus is None else f'at {focus * 1e3:g} mm'}, rendered as a "
                  + camera.lens.model.replace("-", " ")),
-        ("sensor", f"{sensor.colour}, {sensor.bits} bit, exposure {sensor.exposure_time * 1e3:.3g} ms, "
+        ("sensor", f"{sensor.colour}, {sensor.bits} bit, exposure {Unit.of('s').with_unit(sensor.exposure_time)}, "
                    f"full well {sensor.full_well:.0f} e-, read noise {sensor.read_noise:g} e-"),
     ]  # fmt: skip
     rows += [("object", f"{name}: {kind}, {count} triangles") for name, kind, count in found.objects]
@@ -348,6 +349,6 @@ def _laser_rows(view: LaserView, full_well: float) -> list[tuple[str, str]]:
             + number(view.peak_electrons_most, 1, ", at most {:.0f} e-")
             + f" of {full_well:.0f} e-",
         ),
-        ("saturated", number(view.saturated, 0.01, "{:.1f} % of the scan lines that are hit")),
+        ("saturated", number(view.saturated, 0.01, "the brightest pixel, on {:.1f} % of the scan lines that are hit")),
         ("steepest view", number(view.steepest_view, degree, "{:.1f} deg to camera or laser")),
     ]

@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from analysis.line.detection.matched_filter import FILTER_SIGMA, NOISE_GAIN
 from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.camera.camera import Camera
@@ -113,6 +114,15 @@ def ambient_electrons(look: Look, lit: Lit, pixels: Float) -> Float:
 def read_variance(sensor: Sensor) -> float:
     """Read noise, uneven offsets and quantisation, e-^2."""
     return sensor.read_noise**2 + sensor.dsnu**2 + 1.0 / (12.0 * sensor.dn_per_electron**2)
+
+
+def detection_response(amplitude: Float, sigma: Float, background: Float, variance: float) -> Float:
+    """(n,) response of the detection's matched filter to a Gaussian line over that filter's noise beside it.
+
+    Peak and background e-, sigma px, read variance e-^2.
+    """
+    wide = np.sqrt(sigma**2 + 1.0 / 12.0 + FILTER_SIGMA**2)
+    return np.asarray(amplitude * sigma / wide / np.sqrt(NOISE_GAIN * (background + variance)))
 
 
 def centre_bound_px(amplitude: Float, sigma: Float, background: Float, variance: float) -> Float:

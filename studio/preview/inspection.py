@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,9 @@ from render.sensor.response import laser_response
 from render.world.material_checks import check_materials, scene_warnings
 from render.world.placement_checks import check_placement
 from render.world.world import build_world
-from studio.preview.estimates import line_width_px
-from studio.preview.scintillation import exceeding
+from studio.preview.estimates import ambient_electrons, line_pixels, line_width_px
+from studio.preview.preview import Look, Preview
+from studio.preview.saturation import saturated_rows
 from studio.project.project import Project
 
 PROBE_ERROR = 0.05
@@ -44,6 +45,13 @@ BROADEST_PX = 100.0
 """Light this broad is no line; its width is not followed farther."""
 DIM_ELECTRONS = 100.0
 STEEP = math.radians(75)
+
+
+class Beneath(NamedTuple):
+    """Ambient light under a line, e-, of scan lines (n,) in ascending order."""
+
+    scan_line: NDArray[np.int32]
+    electrons: Float
 
 
 @dataclass(frozen=True)
@@ -72,10 +80,10 @@ class LaserView:
     light_electrons: float | None
     """Of the laser alone, without dark current, in the brightest pixel of a scan line, about."""
     peak_electrons: float | None
-    """Of the brightest pixel of a scan line, about."""
+    """Of the brightest pixel of a scan line, with ambient light and dark current, about."""
     peak_electrons_most: float | None
     saturated: float | None
-    """Share of the scan lines that are hit whose brightest pixel exceeds the full well."""
+    """Expected share of the scan lines that are hit whose brightest pixel saturates: `studio.preview.saturation`."""
     ambient_saturated: float | None
     """Share of the line's pixels that the ambient light alone saturates; None: it is not rendered."""
     steepest_view: float | None
@@ -114,7 +122,8 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
     probe = {"laser_error": PROBE_ERROR, "indirect_error": PROBE_REFLECTED, "light_paths": 1 << 20}
     settings = project.render.model_copy(update={**probe, "truth_images": False})
     frame = render_world(world, dark, settings=settings, axis=project.extraction.axis, run=Run(threads=threads))
-    views = laser_views(project, frame)
+    look = Preview(threads).look(project, root)
+    views = laser_views(project, frame, beneath=[_ambient_beneath(look, i) for i in range(len(frame.curves))])
     counts = np.bincount(world.object_id, minlength=len(scene.visible_objects))
     return Inspection(
         name=project.name,
@@ -135,28 +144,48 @@ def view_warnings(project: Project, frame: Frame, laser_power: Sequence[float] |
     return _warnings(project, laser_views(project, frame, laser_power), laser_power)
 
 
-def laser_views(project: Project, frame: Frame, laser_power: Sequence[float] | None = None) -> tuple[LaserView, ...]:
-    """Each laser in a rendered frame; ambient light, where the frame has it, counts for `ambient_saturated` alone."""
+def laser_views(
+    project: Project, frame: Frame, laser_power: Sequence[float] | None = None, beneath: Sequence[Beneath] = ()
+) -> tuple[LaserView, ...]:
+    """Each laser in a rendered frame, and of its ambient light, or of `beneath` where it has none, what is below it."""
     powers = [laser.power for laser in project.scene.lasers] if laser_power is None else laser_power
     ambient = None
     if frame.ambient is not None:
         ambient = expected_electrons(frame, project.scene, project.sensor, laser_power=[0.0] * len(frame.curves))
     alone = replace(frame, ambient=None)
-    return tuple(_laser_view(project, alone, i, power, ambient) for i, power in enumerate(powers))
+    found = []
+    for i, power in enumerate(powers):
+        found.append(_laser_view(project, alone, i, power, ambient, beneath[i] if beneath else None))
+    return tuple(found)
 
 
-def _laser_view(project: Project, frame: Frame, i: int, power: float, ambient: Float32 | None) -> LaserView:
+def _ambient_beneath(look: Look, laser: int) -> Beneath:
+    """The unshadowed ambient light under a laser's line, which `inspect` does not render."""
+    lit = look.lit(laser)
+    index, first = np.unique(lit.curve.index, return_index=True)
+    return Beneath(index, ambient_electrons(look, lit, line_pixels(lit))[first])
+
+
+def _laser_view(
+    project: Project, frame: Frame, i: int, power: float, ambient: Float32 | None, beneath: Beneath | None
+) -> LaserView:
     scene, curve = project.scene, frame.curves[i]
     camera, rows = scene.camera, curve.axis == "rows"
     origin = scene.T_camera_laser(i)[:3, 3]
     plane = scene.laser_plane(i)
     nearest, farthest = working_range(camera, scene.T_camera_laser(i))
     hit = np.unique(curve.index)
-    light, width = _brightness(project, frame, i, power, hit)
-    dark, wavelength = project.sensor.dark_current * project.sensor.exposure_time, scene.lasers[i].wavelength_nm
-    peak = light + dark
-    length, length_px = _lengths(curve)
+    lines = _light(project, frame, i, power)[hit].astype(np.float64)
+    light, width = _brightness(lines)
+    background = np.full((len(hit), 1), project.sensor.dark_current * project.sensor.exposure_time)
+    if ambient is not None:
+        background = (ambient if rows else ambient.T)[hit].astype(np.float64)
+    elif beneath is not None and len(beneath.scan_line):
+        background += np.interp(hit, *beneath)[:, None]
     some = len(curve.point) > 0
+    peak = (lines + background).max(axis=1) if some else np.zeros(0)
+    full = saturated_rows(project.sensor, camera, scene.lasers[i].wavelength_nm, lines, background)
+    length, length_px = _lengths(curve)
     depth_px, along_px = _resolution(camera, plane, curve) if some else (None, None)
     return LaserView(
         name=scene.lasers[i].name,
@@ -176,7 +205,7 @@ def _laser_view(project: Project, frame: Frame, i: int, power: float, ambient: F
         light_electrons=float(np.median(light)) if some else None,
         peak_electrons=float(np.median(peak)) if some else None,
         peak_electrons_most=float(peak.max()) if some else None,
-        saturated=float(np.mean(exceeding(project.sensor, camera, wavelength, light, dark))) if some else None,
+        saturated=float(np.mean(full)) if some else None,
         ambient_saturated=_saturated_along(curve, ambient, project.sensor.full_well),
         steepest_view=float(max(curve.camera_angle.max(), curve.laser_angle.max())) if some else None,
     )
@@ -232,19 +261,21 @@ def _saturated_along(curve: LaserCurve, electrons: Float32 | None, full_well: fl
     return float(np.mean(lines[curve.index, along] > full_well))
 
 
-def _brightness(
-    project: Project, frame: Frame, i: int, own_power: float, hit: NDArray[np.int32]
-) -> tuple[Float, Float]:
-    """Electrons of light in the brightest pixel, and the line's sigma in px, of each scan line that is hit."""
+def _light(project: Project, frame: Frame, i: int, own_power: float) -> Float32:
+    """Electrons of one laser's light, its scan lines along the first axis."""
     power = [own_power if k == i else 0.0 for k in range(len(frame.curves))]
     light_alone = project.sensor.model_copy(update={"dark_current": 0.0})
     electrons = expected_electrons(frame, project.scene, light_alone, laser_power=power)
-    lines = (electrons if frame.curves[i].axis == "rows" else electrons.T)[hit].astype(np.float64)
-    if len(hit) == 0:
+    return electrons if frame.curves[i].axis == "rows" else electrons.T
+
+
+def _brightness(lines: Float) -> tuple[Float, Float]:
+    """Electrons of light in the brightest pixel, and the line's sigma in px, of scan lines (n, w)."""
+    if len(lines) == 0:
         return np.zeros(0), np.zeros(0)
     peak = lines.max(axis=1)
     if not np.any(peak > 0.0):
-        return peak, np.zeros(len(hit))
+        return peak, np.zeros(len(peak))
     rough = float(np.median(lines[peak > 0.0].sum(axis=1) / (peak[peak > 0.0] * math.sqrt(2.0 * math.pi))))
     # second moment within a window about the peak, less that of a pixel (Sheppard's correction)
     half = math.ceil(6.0 * min(rough, BROADEST_PX)) + 1
@@ -315,7 +346,10 @@ def _warnings(project: Project, views: tuple[LaserView, ...], laser_power: Seque
                 "the exposure time, add a band-pass filter, or darken the lamps"
             )
         if view.saturated is not None and view.saturated > 0.01:
-            found.append(f"{view.name}: {view.saturated:.0%} of the line saturates; shorten the exposure time")
+            found.append(
+                f"{view.name}: on {view.saturated:.0%} of the scan lines the brightest pixel saturates; shorten the "
+                "exposure time"
+            )
         if view.light_electrons is not None and view.light_electrons < DIM_ELECTRONS:
             power = project.scene.lasers[i].power if laser_power is None else laser_power[i]
             found.append(f"{view.name}: {_why_dim(project, i, power, view.light_electrons)}")

@@ -15,12 +15,15 @@ from render.camera.camera import Camera
 from studio.preview import estimates
 from studio.preview.inspection import working_range
 from studio.preview.preview import Look
-from studio.preview.scintillation import brightest, saturated_share, speckle_px
+from studio.preview.saturation import brightest, full_electrons, saturated_lines
+from studio.preview.scintillation import speckle_px
 
 RARE = 0.005
 """Share of the scan lines that an exposure may leave saturated by speckle."""
 SPECKLED = 64
 """Places along the line at which the effect of speckle is worked out."""
+FILLED_PLACES = 128
+"""The same of what saturates, which depends on where within a pixel the line falls."""
 
 
 GOOD_PX = 0.05
@@ -53,6 +56,7 @@ class Readouts:
     sharp_farthest: float
     """Depths between which the blur disc is at most `estimates.SHARP_PX`; inf: no end."""
     full_well: float
+    """e- that a pixel tells of at most, by its well or by its highest number."""
     occluded: float | None
     """Share of the line within the image that the camera cannot see."""
     scan_lines: int
@@ -70,11 +74,16 @@ class Readouts:
     peak_electrons: Range | None = None
     """Of the brightest pixel of a scan line, before saturation."""
     saturated: float | None = None
-    """Share of the scan lines that are hit, with the sensor's speckle."""
+    """Expected share of the scan lines that are hit whose brightest pixel saturates, by shot and read noise, and the
+    sensor's speckle."""
     brightest: float = 1.0
     """Times its mean that speckle makes a pixel's laser light on RARE of the scan lines; 1 without speckle."""
+    laser_electrons: float | None = None
+    """What of the brightest pixel is the laser's light, median."""
     ambient_electrons: float | None = None
     """Background of ambient light and dark current, unshadowed, median."""
+    detected: float | None = None
+    """Response of the extraction's detection to the line over the least that counts as one, median."""
     blur_px: Range | None = None
     """Diameter of the blur disc along the lit line."""
     blurs_images: bool = True
@@ -120,7 +129,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         sharp_nearest=sharp[0],
         sharp_farthest=sharp[1],
         blurs_images=sensor.defocus_by(camera.lens.model) != "nothing",
-        full_well=sensor.full_well,
+        full_well=full_electrons(sensor),
         occluded=look.fan(laser).occluded,
         scan_lines=camera.height if rows else camera.width,
         scan_lines_hit=len(hit),
@@ -132,15 +141,16 @@ def readouts(look: Look, laser: int) -> Readouts:
     width = estimates.line_width_px(camera, source, T_camera_laser, lit.normal, curve.point, pixels, rows)
     ambient = estimates.ambient_electrons(look, lit, pixels) + sensor.dark_current * sensor.exposure_time
     amplitude = estimates.line_electrons(camera, source, sensor, lit, pixels)
-    peak = amplitude * estimates.pixel_share(curve.position, width) + ambient
+    light = amplitude * estimates.pixel_share(curve.position, width)
+    peak = light + ambient
     read = estimates.read_variance(sensor)
+    response = estimates.detection_response(amplitude, width, ambient, read)
     bound = estimates.centre_bound_px(amplitude, width, ambient, read)
     some = np.unique(np.linspace(0, len(width) - 1, SPECKLED).astype(int))
     shown = width[some], curve.position[some], amplitude[some], ambient[some]
     speckle = speckle_px(camera, source.wavelength_nm, *shown, read, sensor.speckle == "depolarised")
-    saturated = len(np.unique(curve.index[peak > sensor.full_well])) / len(hit)
-    if sensor.speckle != "off":
-        saturated = float(np.mean(saturated_share(sensor, camera, source.wavelength_nm, *shown)))
+    many = np.unique(np.linspace(0, len(width) - 1, FILLED_PLACES).astype(int))
+    lines = width[many], curve.position[many], amplitude[many], ambient[many]
     return replace(
         known,
         triangulation_angle=_range(triangulation_angles(curve.point, T_camera_laser[:3, 3])),
@@ -149,9 +159,11 @@ def readouts(look: Look, laser: int) -> Readouts:
         along_per_px=_range(np.linalg.norm(estimates.resolution(camera, plane, pixels, along), axis=1)),
         width_px=_range(width),
         peak_electrons=_range(peak),
-        saturated=saturated,
+        saturated=float(np.mean(saturated_lines(sensor, camera, source.wavelength_nm, *lines))),
         brightest=brightest(sensor, camera, source.wavelength_nm, RARE),
+        laser_electrons=_median(light),
         ambient_electrons=float(np.median(ambient)),
+        detected=_median(response / look.project.extraction.threshold),
         blur_px=_range(estimates.blur_px(camera, curve.point)),
         photon_sigma=_median(bound * depth),
         speckle_sigma=_median(speckle * depth[some]),

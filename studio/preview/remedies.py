@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +19,8 @@ from studio.preview.estimates import SHARP_PX
 from studio.preview.inspection import NARROW_PX, WIDE_PX
 from studio.preview.preview import Look
 from studio.preview.readout_rows import Row, micrometres, rows
-from studio.preview.readouts import Readouts, readouts
-from studio.project.document import FieldPath, replaced
+from studio.preview.readouts import Range, Readouts, readouts
+from studio.project.document import FieldPath, replaced, value_at
 from studio.project.project import Project
 
 FILLED = 0.7
@@ -34,6 +35,14 @@ TOLD_FROM = 0.02
 RANK = {"": 0, "warning": 1, "error": 2}
 EXPOSURE: FieldPath = ("sensor", "exposure_time")
 LENS: FieldPath = ("scene", "rig", "camera", "lens")
+
+
+class Step(NamedTuple):
+    """A field's new value, and how it is told."""
+
+    told: str
+    path: FieldPath
+    value: object
 
 
 @dataclass(frozen=True)
@@ -64,12 +73,12 @@ def remedies(look: Look, laser: int, look_at: Callable[[Project], Look]) -> tupl
             then = readouts(look_at(project), laser)
             after = {one.key: one for one in rows(then)}
             if _helps(row.key, before, after):
-                gain = f"{row.label.lower()} {_value(row)} → {_value(after[row.key])}"
+                gain = f"{row.label.lower()} {_gained(row, after[row.key])}"
                 if _differ(now.depth_sigma, then.depth_sigma):
-                    gain += f", depth noise {before['sigma'].value} → {after['sigma'].value}"
+                    gain += f", depth noise {_gained(before['sigma'], after['sigma'])}"
                 if not now.speckled and _differ(now.speckled_sigma, then.speckled_sigma):
                     speckled = (micrometres(one.speckled_sigma or 0.0) for one in (now, then))
-                    gain += f", with speckle {' → '.join(speckled)} µm"
+                    gain += f", with speckle from {' to '.join(speckled)} µm"
                 found.append(Remedy(row.key, label, gain, project))
                 break
     return tuple(found)
@@ -87,10 +96,8 @@ def automatic_exposure(project: Project, now: Readouts) -> Change | None:
     """
     if now.peak_electrons is None or not now.peak_electrons.high > 0.0:
         return None
-    before = project.sensor.exposure_time
     most = now.brightest * now.peak_electrons.high
-    time = float(f"{before * FILLED * now.full_well / most:.3g}")
-    return _told("exposure", "s", before, time), replaced(project, EXPOSURE, time)
+    return _changed(project, _exposed_by(project, FILLED * now.full_well / most))
 
 
 def lit_point(look: Look, laser: int) -> Float:
@@ -104,7 +111,7 @@ def lit_point(look: Look, laser: int) -> Float:
 def _changes(key: str, look: Look, laser: int, now: Readouts) -> Iterator[Change]:
     """What may help a read-out, the least intrusive first; what no project may have is left out."""
     tries = {
-        "peak": (_exposed,),
+        "peak": (_exposed, _powered),
         "saturated": (_exposed,),
         "angle": tuple(_turned(angle) for angle in ANGLES),
         "occluded": tuple(_turned(angle) for angle in ANGLES[1:]),
@@ -117,12 +124,22 @@ def _changes(key: str, look: Look, laser: int, now: Readouts) -> Iterator[Change
             change = attempt(look, laser, now)
         except InputError:
             continue
-        if change is not None:
+        if change is not None and change[1] is not look.project:
             yield change
 
 
 def _exposed(look: Look, laser: int, now: Readouts) -> Change | None:
     return automatic_exposure(look.project, now)
+
+
+def _powered(look: Look, laser: int, now: Readouts) -> Change | None:
+    """So much that the line fills what the light beneath it leaves of FILLED."""
+    if not now.laser_electrons or now.ambient_electrons is None:
+        return None
+    path: FieldPath = (*_laser(laser), "power")
+    room = FILLED * now.full_well - now.ambient_electrons
+    power = look.project.scene.lasers[laser].power * room / (now.brightest * now.laser_electrons)
+    return _changed(look.project, _number(look.project, "power", path, "W", float(f"{power:.3g}")))
 
 
 def _turned(degrees: float) -> Callable[[Look, int, Readouts], Change | None]:
@@ -132,8 +149,9 @@ def _turned(degrees: float) -> Callable[[Look, int, Readouts], Change | None]:
         scene = look.project.scene
         before, camera = scene.lasers[laser].T_rig_laser, scene.camera.T_rig_camera.matrix[:3, 3]
         pose = at_angle(before, camera, lit_point(look, laser), math.radians(degrees))
-        label = _told("triangulation angle", "rad", now.triangulation_angle.middle, math.radians(degrees))
-        return label, replaced(look.project, (*_laser(laser), "T_rig_laser"), pose)
+        path: FieldPath = (*_laser(laser), "T_rig_laser")
+        angle = _from_to("rad", now.triangulation_angle.middle, math.radians(degrees))
+        return _changed(look.project, Step(f"move the laser: triangulation angle {angle}", path, pose))
 
     return change
 
@@ -149,7 +167,7 @@ def _aimed(look: Look, laser: int, now: Readouts) -> Change | None:
         return None
     point = (scene.camera.T_rig_camera.matrix @ [0.0, 0.0, depth, 1.0])[:3]
     pose = aimed(scene.lasers[laser].T_rig_laser, point)
-    return "aim the laser at the camera's view", replaced(look.project, (*_laser(laser), "T_rig_laser"), pose)
+    return _changed(look.project, Step("aim the laser at the camera's view", (*_laser(laser), "T_rig_laser"), pose))
 
 
 def _sheet(look: Look, laser: int, now: Readouts) -> Change | None:
@@ -159,38 +177,52 @@ def _sheet(look: Look, laser: int, now: Readouts) -> Change | None:
     wanted = 2.0 * NARROW_PX if width < NARROW_PX else 0.5 * WIDE_PX
     sheet = look.project.scene.lasers[laser].sheet
     if isinstance(sheet, Waist):
-        distance = float(np.median(look.lit(laser).curve.depth_range))
+        distance = float(f"{np.median(look.lit(laser).curve.depth_range):.3g}")
         path: FieldPath = (*_laser(laser), "sheet", "focus_distance")
-        before, value = sheet.focus_distance, float(f"{distance:.3g}")
-        return _told("the laser's focus", "m", before, value), replaced(look.project, path, value)
-    path, before = (*_laser(laser), "sheet", "full_angle"), sheet.full_angle
-    value = float(f"{before * wanted / width:.3g}")
-    return _told("the sheet's divergence", "rad", before, value, "mrad"), replaced(look.project, path, value)
+        return _changed(look.project, _number(look.project, "the laser's focus", path, "m", distance))
+    path, angle = (*_laser(laser), "sheet", "full_angle"), float(f"{sheet.full_angle * wanted / width:.3g}")
+    return _changed(look.project, _number(look.project, "the sheet's divergence", path, "rad", angle, "mrad"))
 
 
 def _focused(look: Look, laser: int, now: Readouts) -> Change | None:
     """On the depth whose vergence is in the middle of the line's."""
-    if now.distance is None:
-        return None
-    before = look.project.scene.camera.lens.focus_distance
-    value = float(f"{2.0 / (1.0 / now.distance.low + 1.0 / now.distance.high):.4g}")
-    return _told("focus", "m", before, value), replaced(look.project, (*LENS, "focus_distance"), value)
+    return None if now.distance is None else _changed(look.project, _focus(look.project, now.distance))
 
 
 def _stopped_down(look: Look, laser: int, now: Readouts) -> Change | None:
     """Focused, and stopped down until the line is sharp, exposed longer by what that costs of light."""
-    focused = _focused(look, laser, now)
-    if focused is None or now.blur_px is None:
+    if now.distance is None or now.blur_px is None:
         return None
-    before = look.project.scene.camera.lens.f_number
+    project, before = look.project, look.project.scene.camera.lens.f_number
     # at best focus the blur left is about half of the depth's share
     number = next((stop for stop in STOPS if stop >= before * max(1.0, now.blur_px.high / SHARP_PX)), None)
     if number is None or number <= before:
         return None
-    project = replaced(focused[1], (*LENS, "f_number"), number)
-    time = float(f"{project.sensor.exposure_time * (number / before) ** 2:.3g}")
-    label = f"f/{before:g} → f/{number:g}, {_told('exposure', 's', project.sensor.exposure_time, time)}"
-    return label, replaced(project, EXPOSURE, time)
+    aperture = Step(f"f/{before:g} → f/{number:g}", (*LENS, "f_number"), number)
+    return _changed(project, aperture, _focus(project, now.distance), _exposed_by(project, (number / before) ** 2))
+
+
+def _focus(project: Project, distance: Range) -> Step | None:
+    depth = float(f"{2.0 / (1.0 / distance.low + 1.0 / distance.high):.4g}")
+    return _number(project, "focus", (*LENS, "focus_distance"), "m", depth)
+
+
+def _exposed_by(project: Project, times: float) -> Step | None:
+    return _number(project, "exposure", EXPOSURE, "s", float(f"{project.sensor.exposure_time * times:.3g}"))
+
+
+def _number(project: Project, what: str, path: FieldPath, unit: str, value: float, shown: str = "") -> Step | None:
+    """None: it is that already."""
+    before = value_at(project, path)
+    return None if before == value else Step(f"{what} {_from_to(unit, before, value, shown)}", path, value)
+
+
+def _changed(project: Project, *steps: Step | None) -> Change:
+    """What is told is what is changed."""
+    taken = [step for step in steps if step is not None]
+    for step in taken:
+        project = replaced(project, step.path, step.value)
+    return ", ".join(step.told for step in taken), project
 
 
 def _helps(key: str, before: dict[str, Row], after: dict[str, Row]) -> bool:
@@ -199,14 +231,17 @@ def _helps(key: str, before: dict[str, Row], after: dict[str, Row]) -> bool:
     return better and all(RANK[row.level] <= RANK[before[row.key].level] for row in after.values() if row.key in before)
 
 
-def _value(row: Row) -> str:
-    return row.value if row.key != "saturated" else f"{row.value} of the lines"
+def _gained(before: Row, after: Row) -> str:
+    """From what to what, a unit that both have told once."""
+    was, unit = before.value.partition(" ")[::2]
+    told = f"from {was if unit == after.value.partition(' ')[2] else before.value} to {after.value}"
+    return told if before.key != "saturated" else f"{told} of the scan lines"
 
 
-def _told(what: str, unit: str, before: float | None, after: float, shown: str = "") -> str:
+def _from_to(unit: str, before: float | None, after: float, shown: str = "") -> str:
     as_shown = Unit.of(unit, shown)
     was = "far away" if before is None else as_shown.format(float(f"{before:.4g}"))
-    return f"{what} {was} → {as_shown.with_unit(after)}"
+    return f"{was} → {as_shown.with_unit(after)}"
 
 
 def _laser(index: int) -> FieldPath:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from render.base.arrays import Float
 from render.camera.camera import Camera
@@ -27,7 +28,7 @@ def scintillation(sensor: Sensor, camera: Camera, wavelength_nm: float) -> tuple
     """Relative covariance of a laser's light between pixels, () where there is none, and its fineness: `NoiseModel`."""
     table, fineness = np.zeros((1, 1)), 0.0
     if sensor.speckle != "off":
-        table, fineness = _speckle(camera, wavelength_nm, sensor.speckle == "depolarised")
+        table, fineness = relative_covariance(camera, wavelength_nm, sensor.speckle == "depolarised")
     table[0, 0] += sensor.prnu**2
     return tuple(tuple(row) for row in table.tolist()) if table[0, 0] > 0.0 else (), fineness
 
@@ -56,13 +57,13 @@ def speckle_px(
     Without background, a fine grain on a wide line makes it sqrt(C_00 A_c s / (4 sqrt(pi) p^2)), with A_c =
     4 lambda^2 N_w^2 / pi (a line's form of Dorsch, Haeusler and Herrmann 1994).
     """
-    known = np.isfinite(position) & (sigma > 0.0) & (sigma < WIDEST) & (amplitude > 0.0)
+    known = widths_known(sigma, position, amplitude)
     found = np.full(len(sigma), np.nan)
     if not known.any():
         return found
     sigma, position, amplitude, background = (one[known] for one in (sigma, position, amplitude, background))
-    covariance, fineness = _speckle(camera, wavelength_nm, depolarised)
-    across, left, right, light = _light(sigma, position, amplitude)
+    covariance, fineness = relative_covariance(camera, wavelength_nm, depolarised)
+    across, left, right, light = line_light(sigma, position, amplitude)
     slope = amplitude[:, None] * (np.exp(-0.5 * left**2) - np.exp(-0.5 * right**2))
     weight = slope / (light + background[:, None] + variance)
     moved = weight * light / np.sum(weight * slope, axis=1)[:, None]
@@ -75,54 +76,12 @@ def speckle_px(
     return found
 
 
-def saturated_share(
-    sensor: Sensor,
-    camera: Camera,
-    wavelength_nm: float,
-    sigma: Float,
-    position: Float,
-    amplitude: Float,
-    background: Float,
-) -> Float:
-    """(n,) chance that a pixel of the line exceeds the full well, as its speckle draws it: of lines as in `speckle_px`.
-
-    Pixels count as independent, which tells less than a tenth too much where the grain is as large as they are.
-    """
-    known = np.isfinite(position) & (sigma > 0.0) & (sigma < WIDEST) & (amplitude > 0.0)
-    found = np.zeros(len(sigma))
-    if known.any():
-        *_, light = _light(sigma[known], position[known], amplitude[known])
-        one = exceeding(sensor, camera, wavelength_nm, light, background[known][:, None])
-        found[known] = 1.0 - np.prod(1.0 - one, axis=1)
-    return found
+def widths_known(sigma: Float, position: Float, amplitude: Float) -> NDArray[np.bool_]:
+    """(n,) lines that have a place, a width and light."""
+    return np.isfinite(position) & (sigma > 0.0) & (sigma < WIDEST) & (amplitude > 0.0)
 
 
-def exceeding(sensor: Sensor, camera: Camera, wavelength_nm: float, light: Float, background: Float | float) -> Float:
-    """Chance that a pixel exceeds the full well: mean light of the laser and background, e-, of any one shape.
-
-    Goodman, Speckle Phenomena in Optics (2007), 4.6: light that is integrated over a pixel is gamma-distributed.
-    """
-    from scipy.special import gammaincc
-
-    room = sensor.full_well - background
-    if sensor.speckle == "off":
-        return np.asarray(light > room, dtype=np.float64)
-    covariance, _ = _speckle(camera, wavelength_nm, sensor.speckle == "depolarised")
-    cells = 1.0 / covariance[0, 0]
-    return np.asarray(gammaincc(cells, cells * np.maximum(room, 0.0) / np.maximum(light, 1e-12)))
-
-
-def brightest(sensor: Sensor, camera: Camera, wavelength_nm: float, chance: float) -> float:
-    """Times its mean that a pixel's light is exceeded by on `chance` of all lines; 1 without speckle."""
-    from scipy.special import gammainccinv
-
-    if sensor.speckle == "off":
-        return 1.0
-    covariance, _ = _speckle(camera, wavelength_nm, sensor.speckle == "depolarised")
-    return float(gammainccinv(1.0 / covariance[0, 0], chance) * covariance[0, 0])
-
-
-def _light(sigma: Float, position: Float, amplitude: Float) -> tuple[Float, Float, Float, Float]:
+def line_light(sigma: Float, position: Float, amplitude: Float) -> tuple[Float, Float, Float, Float]:
     """(n, m) pixels from the centre of a Gaussian line, their edges in its sigmas, and their light, e-."""
     from scipy.special import ndtr
 
@@ -133,7 +92,7 @@ def _light(sigma: Float, position: Float, amplitude: Float) -> tuple[Float, Floa
     return across, left, right, amplitude[:, None] * area * (ndtr(right) - ndtr(left))
 
 
-def _speckle(camera: Camera, wavelength_nm: float, depolarised: bool) -> tuple[Float, float]:
+def relative_covariance(camera: Camera, wavelength_nm: float, depolarised: bool) -> tuple[Float, float]:
     """(m, m) relative covariance k scan lines and d pixels apart, and how much uneven light adds to a pixel's."""
     field = speckle(wavelength_nm, camera.working_f_number, camera.pixel_pitch, depolarised)
     middle = len(field.correlation) // 2

@@ -21,7 +21,7 @@ def brightness(images: Sequence[Image], names: Sequence[str], frame: Frame) -> s
     lines = []
     for i, (image, name) in enumerate(zip(images, names or [""], strict=True)):
         top, full = int(image.pixels.max()), float(np.mean(image.pixels >= image.saturation))
-        saturated = f", {full:.2%} of the pixels saturated" if full > 0.0 else ""
+        saturated = f", {full:.2%} of the image's pixels saturated" if full > 0.0 else ""
         prefix, where, elsewhere = f"{name}: " if len(images) > 1 else "", "of all", ""
         reflected = frame.quality_of("indirect", name)
         if reflected is not None and reflected.of == "line" and i < len(frame.curves):

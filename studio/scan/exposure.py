@@ -10,6 +10,7 @@ import numpy as np
 from render.frame import Frame
 from render.sampling.random import wrapped
 from render.sensor.develop import Image, develop, expected_electrons
+from studio.preview.saturation import full_electrons
 from studio.project.project import Project
 
 APART = 1_000_003
@@ -60,5 +61,6 @@ def filling_exposure(project: Project, frame: Frame, power: Sequence[float], sha
         across = np.rint(curve.position[seen]).astype(int)[:, None] + np.arange(-BESIDE, BESIDE + 1)
         about = electrons[curve.index[seen][:, None], across.clip(0, electrons.shape[1] - 1)]
         peaks.append(float(np.quantile(about.max(axis=1), BRIGHTEST)))
-    full = min(sensor.full_well, (2**sensor.bits - 1 - sensor.black_level) / sensor.dn_per_electron)
-    return float(f"{sensor.exposure_time * share * full / max(peaks):.3g}") if max(peaks) > 0.0 else None
+    return (
+        float(f"{sensor.exposure_time * share * full_electrons(sensor) / max(peaks):.3g}") if max(peaks) > 0.0 else None
+    )

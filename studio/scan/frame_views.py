@@ -15,6 +15,7 @@ from render.output.tone_mapping import Picture, colour, colour_table, grey, mapp
 from render.scene.scene import Scene
 from render.sensor.develop import Image, expected_electrons
 from studio.preview.preview_image import PreviewImage
+from studio.preview.saturation import full_electrons
 from studio.project.project import Project
 from studio.scan.stages import scaled
 
@@ -164,7 +165,7 @@ def live_picture(project: Project, image: PreviewImage, paint: bool = False) -> 
     """
     small, sensor = scaled(project, image.scale), project.sensor
     frame = Frame(0, image.laser, None, (), None)
-    full = min(sensor.full_well, (2**sensor.bits - 1 - sensor.black_level) / sensor.dn_per_electron)
+    full = full_electrons(sensor)
     total = np.sqrt(image.shade) * np.float32(SHAPE_BRIGHTNESS)
     saturated = np.zeros(total.shape[:2], np.bool_)
     for i, laser in enumerate(project.scene.lasers):

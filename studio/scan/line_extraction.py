@@ -16,6 +16,7 @@ from analysis.line.selection.learned import READY_MADE, load_chooser
 from analysis.line.series.hdr import fuse
 from analysis.line.settings import ExtractionSettings, Method
 from render.sensor.develop import Image
+from studio.editing.units import Unit
 from studio.preview.scintillation import scintillation
 from studio.project.allowed_files import allowed_file
 from studio.project.project import Project
@@ -98,7 +99,7 @@ def note_of(line: Line, settings: ExtractionSettings, times: list[float]) -> str
     """What was done beyond the method itself, for a person."""
     notes = [line.note] if line.note else []
     if len(times) > 1:
-        notes.append(f"{len(times)} exposures fused, " + ", ".join(f"{1e3 * time:.3g}" for time in times) + " ms")
+        notes.append(f"{len(times)} exposures fused, " + ", ".join(Unit.of("s").format(time) for time in times) + " ms")
     if line.candidates is not None:
         told = {
             "continuous": "the smoothest chain of peaks",

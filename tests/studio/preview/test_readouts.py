@@ -8,16 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analysis.line.detection.noise import NoiseModel
+from analysis.line.extract import extract
+from analysis.line.result import Flag
+from analysis.line.settings import ExtractionSettings
 from render.base.pose import Pose
 from render.camera.camera import Camera
 from studio.editing import units
-from studio.preview.estimates import blur_px, centre_bound_px, depth_of_field, read_variance
+from studio.preview.estimates import blur_px, centre_bound_px, depth_of_field, detection_response, read_variance
 from studio.preview.inspection import inspect
 from studio.preview.preview import Preview
 from studio.preview.readout_rows import NOTHING, Row, rows
 from studio.preview.readouts import Readouts, readouts
 from studio.project.document import replaced
 from studio.project.project import Project
+from studio.project.templates import template_folder
+from tests.analysis.line.line_images import expected
 
 PROJECTS = Path(__file__).parents[3] / "assets/projects"
 CAMERA, LASER = ("scene", "rig", "camera"), ("scene", "rig", "lasers", 0)
@@ -163,6 +169,44 @@ def test_depth_noise_says_where_it_takes_the_line_to_be_sharp_and_unsaturated() 
     for project, told in ((sample("plane"), ""), (blurred, "as if in focus"), (exposed, "as if unsaturated")):
         found = next(row for row in rows(read(project, "plane")) if row.key == "sigma")
         assert (told in found.note and found.level == "warning") if told else "as if" not in found.note
+
+
+@pytest.mark.parametrize(("times", "least", "most"), [(0.6, 0.0, 0.1), (1.0, 0.3, 0.7), (1.5, 0.95, 1.0)])
+@pytest.mark.parametrize(("sigma", "background"), [(0.6, 0.0), (1.0, 250.0), (3.0, 250.0)])
+def test_the_least_response_is_found_on_half_of_the_scan_lines(
+    times: float, least: float, most: float, sigma: float, background: float
+) -> None:
+    lines, read, threshold = 2000, 5.0, ExtractionSettings().threshold
+    random = np.random.default_rng(2)
+    one = detection_response(np.ones(1), np.full(1, sigma), np.full(1, background), read**2)[0]
+    light = expected(320, 160 + random.uniform(-0.5, 0.5, lines), times * threshold / one, sigma, 0.0)
+    image = random.poisson(light + background) + read * random.standard_normal(light.shape)
+    line = extract(image.astype(np.float32), noise=NoiseModel(read_noise=read, step=0.0))
+    assert least <= np.mean(line.flag[:, 0] != Flag.NO_PEAK) <= most
+
+
+@pytest.mark.parametrize(("milliwatts", "level"), [(0.1, "error"), (0.3, "warning"), (0.7, "")])
+def test_a_line_that_is_lost_in_the_light_beneath_it_is_warned_of(milliwatts: float, level: str) -> None:
+    """A peak of 285 e-, of which 250 were ambient light, was uncoloured, and 0.8 % of the scan lines were measured."""
+    root = template_folder("v_groove")
+    project = replaced(Project.load(root / "project.json"), (*LASER, "power"), 1e-3 * milliwatts)
+    r = readouts(Preview(1).look(project, root), 0)
+    (peak,) = [row for row in rows(r) if row.key == "peak"]
+    assert peak.level == level and r.laser_electrons is not None and r.ambient_electrons is not None
+    assert peak.note == f"laser {r.laser_electrons:,.0f} over {r.ambient_electrons:,.0f}"
+    assert r.peak_electrons is not None
+    assert r.laser_electrons + r.ambient_electrons == pytest.approx(r.peak_electrons.middle, rel=0.01)
+
+
+def test_the_working_range_tells_what_of_it_the_lens_leaves_sharp() -> None:
+    sharp = replaced(sample("plane"), ("sensor", "defocus"), False)
+    blurred = replaced(sharp, ("sensor", "defocus"), True)
+    near = replaced(blurred, (*CAMERA, "lens", "focus_distance"), 0.1)
+    assert row(sharp, "plane", "working").note == ""
+    r = read(blurred, "plane")
+    assert r.working_nearest is not None and r.working_nearest < r.sharp_nearest < r.sharp_farthest
+    assert row(blurred, "plane", "working").note == row(blurred, "plane", "blur").note
+    assert row(near, "plane", "working").note == "sharp nowhere"
 
 
 def test_nothing_lit_leaves_what_the_rig_alone_decides() -> None:

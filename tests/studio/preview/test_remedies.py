@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from render.laser.laser import Waist
 from studio.preview.preview import Preview
 from studio.preview.readouts import Readouts, readouts
 from studio.preview.remedies import FILLED, Remedy, remedies
 from studio.project.document import replaced, value_at
 from studio.project.project import Project
+from studio.project.templates import template_folder
 
 ROOT = Path(__file__).parents[3] / "assets/projects/plane"
 LASER = ("scene", "rig", "lasers", 0)
@@ -42,6 +46,15 @@ def test_the_exposure_is_set_to_fill_a_share_of_the_full_well(time: float, key: 
     assert remedy.key == key and peak is not None
     # an exposure has three digits
     assert peak.high == pytest.approx(FILLED * remedy.project.sensor.full_well, rel=5e-3)
+
+
+def test_a_line_that_is_too_dim_is_exposed_longer_or_lit_by_more_power() -> None:
+    """On the light beneath it no exposure makes a line of a hundredth of a milliwatt one that is found."""
+    for power, field in ((1e-4, "exposure"), (1e-5, "power")):
+        _, (remedy,) = found_for({(*LASER, "power"): power})
+        after = read(remedy.project)
+        assert remedy.key == "peak" and remedy.label.startswith(f"{field} ")
+        assert after.detected is not None and after.detected > 1.0
 
 
 def test_an_exposure_leaves_room_for_speckle() -> None:
@@ -80,6 +93,79 @@ def test_a_lens_out_of_focus_is_focused_before_it_is_stopped_down() -> None:
     remedy = next(one for one in found if one.key == "blur")
     assert remedy.label.startswith("focus 200 →")
     assert value_at(remedy.project, (*LENS, "f_number")) == value_at(found_for({})[0], (*LENS, "f_number"))
+
+
+NAMES = {
+    "sensor.exposure_time": "exposure ",
+    "scene.rig.camera.lens.focus_distance": "focus ",
+    "scene.rig.camera.lens.f_number": "f/",
+    "scene.rig.lasers.0.power": "power ",
+    "scene.rig.lasers.0.sheet.full_angle": "the sheet's divergence ",
+    "scene.rig.lasers.0.sheet.focus_distance": "the laser's focus ",
+    "scene.rig.lasers.0.T_rig_laser": ("move the laser", "aim the laser"),
+}
+"""What each field that a proposal may change is called in its text."""
+WRONG: tuple[tuple[str, dict[tuple[Any, ...], Any]], ...] = (
+    ("weld_seam", {}),
+    ("weld_seam", {(*LENS, "f_number"): 5.6}),
+    ("weld_seam", {(*LENS, "f_number"): 5.6, (*LENS, "focus_distance"): 0.7747}),
+    ("weld_seam", {(*LENS, "f_number"): 2.0}),
+    ("plane", {("sensor", "exposure_time"): 0.5}),
+    ("plane", {("sensor", "exposure_time"): 1e-6}),
+    ("plane", {(*LASER, "power"): 1e-6}),
+    ("plane", {(*LASER, "sheet", "full_angle"): 2e-2}),
+    ("plane", {(*LASER, "sheet"): Waist(radius=1e-6, focus_distance=0.3)}),
+    ("plane", {(*LASER, "T_rig_laser"): {"translation": (0.02, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0)}}),
+    ("plane", {(*LASER, "T_rig_laser"): {"translation": (0.2, 0.0, 0.0), "rotation": (0.0, 0.9, 0.0)}}),
+    ("plane", {(*LENS, "focus_distance"): 0.2}),
+    ("plane", {(*LENS, "focus_distance"): None}),
+    ("v_groove", {(*LENS, "f_number"): 1.4}),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def proposed() -> list[tuple[Project, Remedy]]:
+    """What is proposed for every kind of wrong, beside the project as it was."""
+    found = []
+    for name, changes in WRONG:
+        root = template_folder(name)
+        project = Project.load(root / "project.json")
+        for path, value in changes.items():
+            project = replaced(project, path, value)
+        look = PREVIEW.look(project, root)
+        found += [(project, one) for one in remedies(look, 0, partial(PREVIEW.look, root=root))]
+    return found
+
+
+def test_every_field_that_a_proposal_changes_is_named_in_its_text(proposed: list[tuple[Project, Remedy]]) -> None:
+    """Of a smaller aperture the focus moved as well, without a word."""
+    seen: set[str] = set()
+    for project, remedy in proposed:
+        before, after = (fields(one.model_dump(mode="json")) for one in (project, remedy.project))
+        changed = {path for path in before | after if before.get(path) != after.get(path)}
+        words = remedy.label.split(", ")
+        named = {path for path, name in NAMES.items() if any(word.startswith(name) for word in words)}
+        assert changed == named, remedy.label
+        seen |= changed
+    assert seen == set(NAMES), "every kind is among them"
+
+
+def fields(value: Any, path: str = "") -> dict[str, Any]:
+    """Leaves of a project's JSON by their paths; a pose is one."""
+    if path.endswith("T_rig_laser") or not isinstance(value, dict | list):
+        return {path: value}
+    items = value.items() if isinstance(value, dict) else enumerate(value)
+    return {key: leaf for name, one in items for key, leaf in fields(one, f"{path}.{name}".lstrip(".")).items()}
+
+
+def test_a_gain_reads_from_what_it_is_to_what_it_will_be(proposed: list[tuple[Project, Remedy]]) -> None:
+    """The old value, beside an arrow that was cut off, read as the result."""
+    for _, remedy in proposed:
+        assert re.search(r" from \S.* to \S", remedy.gain) and "→" not in remedy.gain
+    _, (remedy,) = found_for({("sensor", "exposure_time"): 0.5})
+    assert remedy.gain.startswith("saturated from 100% to 0% of the scan lines, depth noise from ")
+    _, found = found_for({(*LENS, "focus_distance"): 0.2})
+    assert re.match(r"defocus blur from \d+\.\d to \d+\.\d px", found[0].gain)
 
 
 def test_a_proposal_puts_no_other_read_out_out_of_range() -> None:

@@ -10,7 +10,7 @@ from analysis.line.extract import extract
 from render.camera.camera import Camera
 from render.sensor.sensor import Sensor
 from render.sensor.speckle import scintillate, speckle
-from studio.preview.scintillation import brightest, saturated_share, scintillation, speckle_px
+from studio.preview.scintillation import scintillation, speckle_px
 from tests.analysis.line.line_images import expected
 
 PITCH, NM = 3.45e-6, 450.0
@@ -56,30 +56,6 @@ def test_a_drawn_pattern_moves_the_fitted_line_as_much_as_foretold(
     )
     # first order in a contrast of up to 0.41; neighbouring rows err alike, which leaves some 3000 for the statistics
     assert np.std(error) == pytest.approx(np.sqrt(np.mean(told**2)), rel=within)
-
-
-@pytest.mark.parametrize(("f_number", "sigma", "amplitude"), [(1.4, 0.8, 8e3), (2.8, 1.2, 6e3), (5.6, 1.2, 5e3)])
-def test_as_many_lines_saturate_as_a_drawn_pattern_has(f_number: float, sigma: float, amplitude: float) -> None:
-    rows, background = 4000, 300.0
-    rough = Sensor(speckle="polarised", full_well=10_000)
-    centre = 40 + np.random.default_rng(3).uniform(-0.5, 0.5, rows)
-    field = speckle(NM, camera(f_number).working_f_number, PITCH)
-    light = expected(80, centre, amplitude, sigma, 0.0).astype(np.float32)
-    image = scintillate(light, 0, rows, field, 4, 0, 0) + np.float32(background)
-    found = float(np.mean(image.max(axis=1) > rough.full_well))
-    shown = np.full(rows, sigma), centre, np.full(rows, amplitude), np.full(rows, background)
-    told = float(np.mean(saturated_share(rough, camera(f_number), NM, *shown)))
-    # neighbouring rows saturate together
-    assert told == pytest.approx(found, abs=4 * np.sqrt(2 * found * (1 - found) / rows))
-    assert not saturated_share(rough.model_copy(update={"speckle": "off"}), camera(f_number), NM, *shown).any()
-
-
-def test_the_brightest_of_a_pattern_is_the_quantile_of_its_pixels() -> None:
-    rough = Sensor(speckle="polarised")
-    field = speckle(NM, camera(2.8).working_f_number, PITCH)
-    flat = scintillate(np.ones((600, 600), np.float32), 0, 600, field, 2, 0, 0)
-    assert brightest(rough, camera(2.8), NM, 0.005) == pytest.approx(np.quantile(flat, 0.995), rel=0.02)
-    assert brightest(Sensor(speckle="off"), camera(2.8), NM, 0.005) == 1.0
 
 
 def test_covariance_is_that_of_the_pattern_and_of_uneven_pixels() -> None:

@@ -40,4 +40,4 @@ def test_light_that_a_goal_in_depth_leaves_as_noise_is_not_the_brightest_pixel()
 
 def test_of_a_goal_in_the_image_every_pixel_counts() -> None:
     told = brightness([image(4095)], ["laser"], frame("image"))
-    assert told == "brightest pixel of all 4095 DN, 100% of full, 0.03% of the pixels saturated"
+    assert told == "brightest pixel of all 4095 DN, 100% of full, 0.03% of the image's pixels saturated"

@@ -54,7 +54,7 @@ KINDS = {
     "light outside the filter": (changed(("sensor", "band_pass"), BandPass(centre_nm=650.0)), "nothing of 450 nm"),
     "light outside the sensor's band": (changed((*LASER, "wavelength_nm"), 1900.0), "nothing of 1900 nm"),
     "too short an exposure": (changed(("sensor", "exposure_time"), 1e-7), "the line is dim"),
-    "all saturated": (changed(("sensor", "exposure_time"), 10.0), "100% of the line saturates"),
+    "all saturated": (changed(("sensor", "exposure_time"), 10.0), "on 100% of the scan lines the brightest"),
     "too small a scale": (lambda project: scaled(project, 0.2), "the line's sigma is about 0."),
     "sheet beside the part": (
         changed((*LASER, "T_rig_laser"), Pose(translation=(0.2, 0.0, 0.0), rotation=(0.0, 0.5, 0.0))),

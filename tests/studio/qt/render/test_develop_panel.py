@@ -94,7 +94,7 @@ def test_what_is_warned_of_is_of_the_exposure_that_was_measured(qtbot, panel):
         with qtbot.waitSignal(session.measured, timeout=20000):
             type_into(qtbot, panel.exposure.box, f"{times * exposure:.4f}")
         settle(qtbot, panel)
-        assert any("of the line saturates" in text for text in session.shown.doubts) == told
+        assert any("of the scan lines the brightest pixel saturates" in text for text in session.shown.doubts) == told
 
 
 def test_dragging_the_slider_is_one_step_of_the_history(qtbot, panel):
