@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from analysis.gauges.gauge import TITLES, Gauge, Kind
+from analysis.gauges.gauge import REGIONS, TITLES, Gauge, Kind
 from analysis.report.units import NONE, digits
 
 COLUMNS = ("kind", "value", "sigma", "nominal", "tolerance", "verdict", "error", "error / sigma")
@@ -22,6 +22,8 @@ DEFINITIONS: dict[Kind, str] = {
     "to valley over its least-squares plane; waves, dents and roughness do not count, as they do by ISO 1101.",
 }
 """Of kinds whose name a drawing means otherwise, by a sentence each."""
+OPPOSITE = 0.02
+"""Of a nominal, by which a value may differ that is taken for it with the other sign."""
 FEWEST, MOST = 2, 6
 """Digits after the point, of mm, mm² or degrees."""
 UNITS = {"m": (1e3, "\u00a0mm"), "rad": (math.degrees(1.0), "°"), "m2": (1e6, "\u00a0mm²")}
@@ -64,9 +66,14 @@ def tolerance_text(lower: float | None, upper: float | None, unit: str) -> str:
     return f"{' / '.join(ends)}{name}"
 
 
-def beside_nominal(gauge: Gauge) -> str:
-    """What to say of a tolerance that no part meets, or none that is as large as its nominal; empty: of any other."""
+def beside_nominal(gauge: Gauge, value: float | None = None) -> str:
+    """What to say of a tolerance that no part meets, or none that is as large as its nominal, and of a value that is
+    the nominal but for its sign; empty: of any other."""
     lower, upper, nominal = gauge.lower, gauge.upper, gauge.nominal
+    if nominal is not None and value is not None and abs(value + nominal) < OPPOSITE * abs(nominal):
+        sides = f"from the {REGIONS[gauge.kind][0]} to the {REGIONS[gauge.kind][-1]}"
+        counted = f": it counts {sides}" if len(REGIONS[gauge.kind]) > 1 else ""
+        return f"The value is the nominal with the other sign{counted}. Change the nominal's sign, or draw them anew."
     if nominal is not None and lower == upper == 0.0:
         return "Both limits are zero: no part passes, as none is known without any uncertainty."
     if nominal is None or not ((lower or 0.0) > 0.0 or (upper or 0.0) < 0.0):

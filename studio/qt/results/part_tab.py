@@ -340,10 +340,10 @@ class PartTab(QWidget):
             text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
         elif entry is not None and (reason := entry["reason"] or entry["first_reason"]):
             text = _sentence(reason)
+        elif gauge is not None and (odd := beside_nominal(gauge, None if entry is None else entry["value"])):
+            text = odd
         elif entry is not None and entry["remark"]:
             text = _sentence(f"{entry['remark']}.")
-        elif gauge is not None and (odd := beside_nominal(gauge)):
-            text = odd
         elif self.readings and (render := self.session.shown) is not None:
             text = lean_text(render.project.scene, self.laser, render.frame.step, self.session.project.measured_in)
         if self._read and self.placing is None:
