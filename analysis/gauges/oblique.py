@@ -1,7 +1,8 @@
 """How obliquely a section crosses the faces that a measure is of, and the same points in a section square to them.
 
 Only where the truth tells the surface's normals. A flat face says across itself alone where a section is square to it,
-two that are not parallel, or one that is round about one axis, say along which direction they run.
+two that are not parallel, or one that is round about one axis, say along which direction they run. A ball has no such
+direction: its own radius follows from where its normals point to.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.gauges.profile import Profile
 from render.base.arrays import Float
@@ -22,6 +24,8 @@ OF_ONE_DIRECTION = 0.1
 """The same of the third over the one that still counts: above it faces run along no direction in common."""
 NEARLY_ALONG = math.radians(80.0)
 """More oblique sections show nothing of the faces' shape."""
+NOT_OF_A_BAR = 1e-3
+"""Of a unit normal off the plane that a bar's lie in: facets alone turn them by less."""
 SQUARE = math.radians(0.5)
 """A section that is no farther off is called square."""
 
@@ -31,8 +35,8 @@ def running_along(profile: Profile, used: Float) -> Float | None:
     section's normal; None: they run along none in common, or their normals are unknown."""
     if profile.normal is None:
         return None
-    here = (used > 0.0) & np.isfinite(profile.normal).all(axis=1)
-    if np.count_nonzero(here) < FEWEST:
+    here = _known(profile, used)
+    if np.count_nonzero(here) < FEWEST or _of_a_ball(profile.normal[here]):
         return None
     _, size, axes = np.linalg.svd(np.sqrt(used[here])[:, None] * profile.normal[here], full_matrices=False)
     if size[1] < FLAT * size[0]:
@@ -45,6 +49,34 @@ def running_along(profile: Profile, used: Float) -> Float | None:
         return None
     length = math.copysign(float(np.linalg.norm(along)), along[0])
     return np.asarray(along / length) if length else None
+
+
+def _known(profile: Profile, used: Float) -> NDArray[np.bool_]:
+    """(m,) points that a measure uses, weights (m,), and whose normals are known."""
+    assert profile.normal is not None
+    return np.asarray((used > 0.0) & np.isfinite(profile.normal).all(axis=1))
+
+
+def _of_a_ball(normal: Float) -> bool:
+    """Whether normals (m, 3) lean towards one direction all alike, as where a plane cuts a ball, and not as a bar's or
+    any other face's."""
+    least = float(np.linalg.svd(normal, compute_uv=False)[2])
+    alike = float(np.linalg.svd(normal - normal.mean(axis=0), compute_uv=False)[2])
+    return least > NOT_OF_A_BAR * math.sqrt(len(normal)) and alike < 0.5 * least
+
+
+def lean_off_a_ball(profile: Profile, used: Float) -> tuple[float, bool] | None:
+    """rad, between the plane of the points with weights (m,) and the normals of the ball that they are of, and whether
+    the section is that plane; None: they are of no ball, or nothing is known of it."""
+    if profile.normal is None or profile.place is None:
+        return None
+    here = _known(profile, used)
+    if np.count_nonzero(here) < FEWEST or not _of_a_ball(profile.normal[here]):
+        return None
+    place = profile.place[here]
+    across = np.linalg.svd(place - place.mean(axis=0), full_matrices=False)[2][2]
+    lean = math.asin(min(abs(float(np.median(profile.normal[here] @ across))), 1.0))
+    return lean, abs(float(across[0])) >= math.cos(SQUARE)
 
 
 def obliquity(along: Float) -> float:

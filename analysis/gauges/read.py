@@ -11,7 +11,14 @@ import numpy as np
 from analysis.gauges.area import area_above, section, unseen, without_unsure
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, Gauge, Verdict
-from analysis.gauges.oblique import moved_regions, oblique_remark, obliquity, running_along, square_profile
+from analysis.gauges.oblique import (
+    lean_off_a_ball,
+    moved_regions,
+    oblique_remark,
+    obliquity,
+    running_along,
+    square_profile,
+)
 from analysis.gauges.profile import Profile
 from analysis.gauges.undetermined import undetermined
 from render.base.arrays import Float
@@ -114,8 +121,10 @@ def _beside_square(one: Reading, profile: Profile) -> Reading:
     """With what it would be square to its faces, where that is another value."""
     parts = parts_of(one.gauge, profile)
     along = None if isinstance(parts, str) else running_along(profile, np.max(parts, axis=0))
-    if isinstance(parts, str) or along is None:
+    if isinstance(parts, str):
         return one
+    if along is None:
+        return _beside_ball(one, profile, parts[0]) if one.gauge.kind == "radius" else one
     if (square := square_profile(profile, along)) is None:
         return _told(one, oblique_remark(profile, along, ""), obliquity(along))
     regions = moved_regions(one.gauge.regions, parts, profile, square)
@@ -127,6 +136,22 @@ def _beside_square(one: Reading, profile: Profile) -> Reading:
     if not abs(change) > one.sigma:
         return one
     return _told(one, oblique_remark(profile, along, _in_words(value, one.gauge.unit)), obliquity(along), value)
+
+
+def _beside_ball(one: Reading, profile: Profile, used: Float) -> Reading:
+    """A radius beside that of the ball whose middle the sheet does not meet."""
+    found = lean_off_a_ball(profile, used)
+    if found is None:
+        return one
+    lean, in_its_plane = found
+    if not in_its_plane:
+        return _told(one, "the points are of a ball, round in the laser's plane alone: choose that section", lean)
+    radius = one.value / math.cos(lean)
+    if not abs(radius - one.value) > one.sigma:
+        return one
+    aside = _in_words(one.value * math.tan(lean), "m")
+    own = f"the sheet passes the middle of the ball by {aside}, whose own radius is {_in_words(radius, 'm')}"
+    return _told(one, f"{own}; aim the laser at it", lean, radius)
 
 
 def _told(one: Reading, told: str, oblique: float, square: float = NAN) -> Reading:

@@ -68,7 +68,7 @@ def test_the_dimension_square_to_the_faces_is_that_of_the_part(kind: str) -> Non
         assert abs(found.square - exact) < max(0.02 * abs(found.value - exact), 5.0 * found.sigma)
 
 
-def test_a_flat_face_says_how_far_a_section_leans_from_it_and_a_sphere_says_nothing() -> None:
+def test_a_flat_face_says_how_far_a_section_leans_from_it_and_normals_of_all_sides_say_nothing() -> None:
     flat = through(-0.5 + 0.002 * (ACROSS > 0.0), 0.0)
     lean = math.radians(10.0)
     tilt = rotation_matrix(np.array([0.0, lean, 0.0]))
@@ -81,8 +81,41 @@ def test_a_flat_face_says_how_far_a_section_leans_from_it_and_a_sphere_says_noth
     found = read(gauge("step"), 0, leaning, None)
     assert found.square == pytest.approx(0.002, abs=1e-8) and found.oblique == pytest.approx(lean)
     everywhere = np.random.default_rng(1).standard_normal((len(ACROSS), 3))
-    ball = replace(leaning, normal=everywhere / np.linalg.norm(everywhere, axis=1, keepdims=True))
-    assert read(gauge("step"), 0, ball, None).remark == ""
+    rough = replace(leaning, normal=everywhere / np.linalg.norm(everywhere, axis=1, keepdims=True))
+    assert read(gauge("step"), 0, rough, None).remark == ""
+
+
+def ball(radius: float, aside: float, half: float, turn: float) -> tuple[Profile, float]:
+    """Cut by a plane that passes its middle, over an angle on either side of its top, in a section that is turned from
+    that plane; and the circle's radius."""
+    circle = math.sqrt(radius**2 - aside**2)
+    angle = np.linspace(-half, half, 301)
+    points = np.stack([np.full(len(angle), aside), circle * np.sin(angle), -circle * np.cos(angle)], axis=1)
+    about = rotation_matrix(np.array([0.0, turn, 0.0]))
+    normal, place = points / radius @ about.T, points @ about.T + [0.0, 0.0, 0.6]
+    flat = np.stack([place[:, 1], -place[:, 2]], axis=1)
+    sight = np.tile([0.0, 1e-6], (len(angle), 1))
+    return Profile(
+        position=flat, random=sight, systematic=np.zeros((len(angle), 2, 0)), index=np.arange(len(angle)),
+        correlation_length=np.ones(len(angle)), place=place, normal=normal,
+    ), circle  # fmt: skip
+
+
+@pytest.mark.parametrize("half", [0.4, 0.8, 1.2])
+def test_a_ball_that_the_sheet_passes_aside_of_its_middle_is_told_with_its_own_radius(half: float) -> None:
+    cut, circle = ball(0.05, 0.011247, half, 0.0)
+    reach = 0.98 * circle * math.sin(half)
+    found = read(Gauge(kind="radius", regions=((-reach, reach),)), 0, cut, None)
+    assert found.value == pytest.approx(circle, rel=1e-6) and found.square == pytest.approx(0.05, rel=1e-6)
+    assert "the sheet passes the middle of the ball by 11.2470 mm, whose own radius is 50.0000 mm" in found.remark
+    assert found.oblique == pytest.approx(math.asin(0.011247 / 0.05), rel=1e-6)
+
+
+def test_in_another_section_a_ball_is_no_circle_and_through_its_middle_nothing_is_said() -> None:
+    gauge_of = Gauge(kind="radius", regions=((-0.03, 0.03),))
+    found = read(gauge_of, 0, ball(0.05, 0.011247, 0.9, math.radians(13.0))[0], None)
+    assert "round in the laser's plane alone" in found.remark and math.isnan(found.square)
+    assert read(gauge_of, 0, ball(0.05, 0.0, 0.9, 0.0)[0], None).remark == ""
 
 
 def test_a_photograph_has_no_normals_and_says_nothing() -> None:
