@@ -63,9 +63,11 @@ class Errors:
     measured_rows: int
     """Scan lines on which a point matches the truth and is no outlier."""
     false_rows: int
-    """Scan lines with a peak where there is no line to be seen, also with one whose ray gives it no depth."""
+    """Scan lines with a point where there is no line to be seen."""
     false_rows_at_ends: int
-    """Those of them whose peaks are all next to an end of the line."""
+    """Those of them whose points are all next to an end of the line."""
+    depthless_rows: int
+    """Scan lines with peaks where there is no line to be seen, none of whose rays gives a point."""
 
     @property
     def completeness(self) -> float:
@@ -113,7 +115,8 @@ def compare(
     wrong = outliers(position, 1.0, edge)
     valid_rows = np.unique(points.index[points.valid])
     truth_rows = np.unique(curve.index[lit])
-    false = ~np.isin(points.index, truth_rows)
+    elsewhere = ~np.isin(points.index, truth_rows)
+    false = elsewhere & points.valid
     index = points.index[false]
     crossings = np.column_stack([curve.index[lit], curve.position[lit]])
     away = index[~_beside_end(np.column_stack([index, along[false]]), crossings)] if len(index) else index
@@ -135,6 +138,7 @@ def compare(
         measured_rows=len(np.unique(points.index[matched & ~wrong])),
         false_rows=len(np.unique(index)),
         false_rows_at_ends=len(np.setdiff1d(index, away)),
+        depthless_rows=len(np.setdiff1d(points.index[elsewhere], index)),
     )
 
 

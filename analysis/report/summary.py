@@ -107,6 +107,12 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
         )
     if found.false_rows:
         said.append(_of_false_rows(found.false_rows, found.false_rows_at_ends))
+    if found.depthless_rows:
+        has = "has" if found.depthless_rows == 1 else "have"
+        said.append(
+            f"{counted(found.depthless_rows, 'scan line')} without a line {has} a peak whose ray gives no depth: it is "
+            "of stray light or noise, and neither a point nor a false scan line."
+        )
     # what most points err by, all alike and each on its own
     usual = np.hypot(found.depth_z.median, found.depth_z.robust_sigma)
     dominated = found.depth_z.rmse > DOMINATED * usual

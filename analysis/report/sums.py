@@ -56,6 +56,7 @@ class Sums:
     measured_rows: int = 0
     false_rows: int = 0
     false_rows_at_ends: int = 0
+    depthless_rows: int = 0
     position: Moments = field(default_factory=Moments)
     depth: Moments = field(default_factory=Moments)
     off_surface: Moments = field(default_factory=Moments)
@@ -70,6 +71,7 @@ class Sums:
         self.measured_rows += errors.measured_rows
         self.false_rows += errors.false_rows
         self.false_rows_at_ends += errors.false_rows_at_ends
+        self.depthless_rows += errors.depthless_rows
         self.position.add(errors.position, points.sigma_pixel)
         self.depth.add(errors.depth, points.sigma_depth)
         self.off_surface.add(errors.off_surface, errors.sigma_off_surface)
@@ -83,6 +85,7 @@ class Sums:
         self.measured_rows += other.measured_rows
         self.false_rows += other.false_rows
         self.false_rows_at_ends += other.false_rows_at_ends
+        self.depthless_rows += other.depthless_rows
         self.position.merge(other.position)
         self.depth.merge(other.depth)
         self.off_surface.merge(other.off_surface)

@@ -53,6 +53,8 @@ class Total:
     false_rows: int
     false_rows_at_ends: int
     """Those of them that are next to an end of the line."""
+    depthless_rows: int
+    """Without a line and with a peak whose ray gives no point."""
     lines_kept: int
     lines: int
     narrow: float = 0.0
@@ -95,6 +97,7 @@ def total(chosen: Chosen) -> Total:
         measured_rows=sums.measured_rows,
         false_rows=sums.false_rows,
         false_rows_at_ends=sums.false_rows_at_ends,
+        depthless_rows=sums.depthless_rows,
         lines_kept=chosen.lines_kept,
         lines=chosen.lines,
         narrow=_share(rows["width"][np.isfinite(rows["width"])] < NARROW_PX),

@@ -126,14 +126,16 @@ def test_false_rows_next_to_an_end_are_counted_apart_from_stray_ones():
     assert (errors.false_rows, errors.false_rows_at_ends) == (8, 5)
 
 
-def test_a_peak_whose_ray_gives_no_depth_is_a_false_row_and_no_point():
-    """It was counted nowhere."""
+def test_a_peak_whose_ray_gives_no_depth_is_no_point_and_counted_by_itself():
+    """Among the false rows, which have points, the counts of a report would not add up."""
     curve, u = wall_curve(np.arange(100, 200)), np.full((2048, 1), np.nan)
     u[100:200, 0] = curve.position
     u[1783, 0] = 100.0  # beyond the plane's vanishing line
+    u[300, 0] = curve.position[0]
     points, errors = errors_of(line_of(u, 0.05), curve)
     assert not points.valid[-1] and np.isnan(points.depth_z[-1])
-    assert (errors.false_rows, errors.false_rows_at_ends, errors.valid_rows) == (1, 0, 100)
+    assert (errors.false_rows, errors.depthless_rows, errors.valid_rows) == (1, 1, 101)
+    assert errors.measured_rows + errors.false_rows == errors.valid_rows
 
 
 def test_coverage_tells_an_honest_sigma_from_a_boastful_one():

@@ -18,7 +18,7 @@ HONEST = 88.0
 EXPLAINED = {
     "Points": "Points measured.",
     "Completeness": "Share of the scan lines on which the line can be seen that have a point of it, and no outlier.",
-    "False scan lines": "Scan lines with a point although no line is to be seen there, also one without depth.",
+    "False scan lines": "Scan lines with a point although no line is to be seen there.",
     "Bias": "Mean error: what averaging does not remove.",
     UNCERTAINTY: "Twice the standard deviation of the bias, as neighbouring scan lines err alike: a smaller one may be "
     "chance.",
