@@ -261,7 +261,8 @@ def counts(report: ReportInput) -> list[tuple[str, str]]:
     for quantity, (added, frames) in report.record.counts.items():
         match quantity.kind:
             case "error":
-                text = percent(added / frames, 2)
+                # such light is not known at all: how far from it is no figure
+                text = percent(added / frames, 2) if added < frames else "over 100\u00a0%"
             case "mean":
                 text = f"{added / frames:.3g}"
             case "seconds":
