@@ -25,6 +25,8 @@ MEASURED = 3.0
 """Times the detection's threshold from which a line on ambient light is measured nearly as often as it is detected: of
 v_groove at 0.3 mW, at twice the threshold, a fit refused six in seven of the scan lines."""
 
+NOT_REFLECTED = "Light that is reflected between surfaces, which a render shows, is not counted."
+
 
 @dataclass(frozen=True)
 class Row:
@@ -170,7 +172,10 @@ def _working_depth(r: Readouts) -> str:
 
 
 def _peak(r: Readouts) -> Row:
-    help = "Electrons of the brightest pixel of a scan line, with the ambient light that no shadow takes away."
+    help = (
+        "Electrons of the brightest pixel of a scan line, with the ambient light that no shadow takes away. "
+        f"{NOT_REFLECTED}"
+    )
     if r.peak_electrons is None or r.laser_electrons is None or r.ambient_electrons is None or r.detected is None:
         return Row("peak", "Peak signal", NOTHING, "", "", help)
     middle, low, high = r.peak_electrons.middle, r.peak_electrons.low, r.peak_electrons.high
@@ -189,7 +194,8 @@ def _peak(r: Readouts) -> Row:
 def _saturation(r: Readouts) -> Row:
     help = (
         "Expected share of the scan lines whose brightest pixel exceeds the full well: shot and read noise decide it, "
-        "and speckle where the sensor's is switched on. Shorten the exposure, or lower the power."
+        "and speckle where the sensor's is switched on. Shorten the exposure, or lower the power. "
+        f"{NOT_REFLECTED}"
     )
     if r.saturated is None or r.peak_electrons is None:
         return Row("saturated", "Saturated", NOTHING, "", "", help)
