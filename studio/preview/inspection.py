@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.report.total import NARROW_PX as UNDERSAMPLED_PX
 from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float, Float32
 from render.camera.camera import Camera
@@ -38,7 +39,8 @@ PROBE_ERROR = 0.05
 PROBE_REFLECTED = 0.3
 """The same of reflected light."""
 WORKING_DISTANCES = np.geomspace(0.01, 100.0, 4001)
-NARROW_PX, WIDE_PX = 0.5, 6.0
+NARROW_PX, WIDE_PX = 1.25 * UNDERSAMPLED_PX, 6.0
+"""Sigma of a line that measures well: with room above what pixels undersample, as a median varies along the line."""
 SHOWN_PX = 0.45
 """Sigma below which a line's second moment in an image depends on where between the pixels it lies."""
 BROADEST_PX = 100.0
@@ -354,7 +356,10 @@ def _warnings(project: Project, views: tuple[LaserView, ...], laser_power: Seque
             power = project.scene.lasers[i].power if laser_power is None else laser_power[i]
             found.append(f"{view.name}: {_why_dim(project, i, power, view.light_electrons)}")
         if view.width_px is not None and not NARROW_PX <= view.width_px <= WIDE_PX:
-            found.append(f"{view.name}: the line's sigma is about {view.width_px:.2f} px; 0.5 to 6 px measure well")
+            found.append(
+                f"{view.name}: the line's sigma is about {view.width_px:.2f} px; "
+                f"{NARROW_PX:g} to {WIDE_PX:g} px measure well"
+            )
         if view.steepest_view is not None and view.steepest_view > STEEP:
             found.append(
                 f"{view.name}: parts are seen or lit at {math.degrees(view.steepest_view):.0f} deg: expect bias"

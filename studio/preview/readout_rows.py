@@ -14,12 +14,18 @@ from studio.preview.readouts import Range, Readouts
 
 Level = Literal["", "warning", "error"]
 NOTHING = "-"
+SATURATED = 0.01
+"""Share of the scan lines from which the line counts as saturated."""
 MUCH_SATURATED = 0.2
 """Share of the scan lines from which the line is no longer measured as it would be."""
+MOST_SATURATED = 0.5
+"""Share from which a median along the line is of one that saturates."""
 
 MEASURED = 3.0
 """Times the detection's threshold from which a line on ambient light is measured nearly as often as it is detected: of
 v_groove at 0.3 mW, at twice the threshold, a fit refused six in seven of the scan lines."""
+
+NOT_REFLECTED = "Light that is reflected between surfaces, which a render shows, is not counted."
 
 
 @dataclass(frozen=True)
@@ -166,7 +172,10 @@ def _working_depth(r: Readouts) -> str:
 
 
 def _peak(r: Readouts) -> Row:
-    help = "Electrons of the brightest pixel of a scan line, with the ambient light that no shadow takes away."
+    help = (
+        "Electrons of the brightest pixel of a scan line, with the ambient light that no shadow takes away. "
+        f"{NOT_REFLECTED}"
+    )
     if r.peak_electrons is None or r.laser_electrons is None or r.ambient_electrons is None or r.detected is None:
         return Row("peak", "Peak signal", NOTHING, "", "", help)
     middle, low, high = r.peak_electrons.middle, r.peak_electrons.low, r.peak_electrons.high
@@ -185,11 +194,12 @@ def _peak(r: Readouts) -> Row:
 def _saturation(r: Readouts) -> Row:
     help = (
         "Expected share of the scan lines whose brightest pixel exceeds the full well: shot and read noise decide it, "
-        "and speckle where the sensor's is switched on. Shorten the exposure, or lower the power."
+        "and speckle where the sensor's is switched on. Shorten the exposure, or lower the power. "
+        f"{NOT_REFLECTED}"
     )
     if r.saturated is None or r.peak_electrons is None:
         return Row("saturated", "Saturated", NOTHING, "", "", help)
-    level: Level = "error" if r.saturated > MUCH_SATURATED else "warning" if r.saturated > 0.01 else ""
+    level: Level = "error" if r.saturated > MUCH_SATURATED else "warning" if r.saturated > SATURATED else ""
     full = r.peak_electrons.high / r.full_well
     alone = " without speckle" if r.speckled else ""
     return Row("saturated", "Saturated", f"{r.saturated:.0%}", f"{full:.0%} of full well{alone}", level, help)
@@ -220,6 +230,9 @@ def _sigma(r: Readouts) -> Row:
     )
     if r.photon_sigma is None or r.speckle_sigma is None or r.speckled_sigma is None:
         return Row("sigma", "Depth noise, sigma", NOTHING, "", "", help)
+    if r.saturated is not None and r.saturated > MOST_SATURATED:
+        help += " Here most of the line saturates: more light would make it look better and the measurement worse."
+        return Row("sigma", "Depth noise, sigma", NOTHING, "saturated", "warning", help)
     photon, speckle = micrometres(r.photon_sigma), micrometres(r.speckle_sigma)
     supposed, level = _supposed(r)
     if supposed:
@@ -230,10 +243,10 @@ def _sigma(r: Readouts) -> Row:
             f" The sensor's is off: images have none, where a laser on a rough surface would make it {both} µm. "
             "Switch it on in the sensor, under Laser speckle, for what a real scanner meets."
         )
-        return Row("sigma", "Depth noise, sigma", f"{photon} µm", _both(f"with speckle {both}", supposed), level, help)
+        return Row("sigma", "Depth noise, sigma", f"{photon} µm", _both(supposed, f"with speckle {both}"), level, help)
     help += f" Here: {photon} µm from photons, {speckle} µm from speckle."
     note = f"speckle {speckle}" if r.speckle_sigma > r.photon_sigma else f"photons {photon}"
-    return Row("sigma", "Depth noise, sigma", f"{micrometres(r.speckled_sigma)} µm", _both(note, supposed), level, help)
+    return Row("sigma", "Depth noise, sigma", f"{micrometres(r.speckled_sigma)} µm", _both(supposed, note), level, help)
 
 
 def _supposed(r: Readouts) -> tuple[str, Level]:
@@ -246,8 +259,9 @@ def _supposed(r: Readouts) -> tuple[str, Level]:
     return (f"as if {' and '.join(wrong)}", "warning") if wrong else ("", "")
 
 
-def _both(note: str, more: str) -> str:
-    return f"{note}, {more}" if more else note
+def _both(supposed: str, note: str) -> str:
+    """A narrow panel cuts off the end."""
+    return f"{supposed}, {note}" if supposed else note
 
 
 def _length(value: float) -> str:

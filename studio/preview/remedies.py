@@ -18,8 +18,9 @@ from studio.editing.units import Unit
 from studio.preview.estimates import SHARP_PX
 from studio.preview.inspection import NARROW_PX, WIDE_PX
 from studio.preview.preview import Look
-from studio.preview.readout_rows import Row, micrometres, rows
-from studio.preview.readouts import Range, Readouts, readouts
+from studio.preview.readout_rows import NOTHING, SATURATED, Row, micrometres, rows
+from studio.preview.readouts import RARE, Range, Readouts, readouts
+from studio.preview.saturation import brightest
 from studio.project.document import FieldPath, replaced, value_at
 from studio.project.project import Project
 
@@ -31,7 +32,7 @@ STOPS = (1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0)
 Change = tuple[str, Project]
 """What is done, and the project with it."""
 TOLD_FROM = 0.02
-"""Change of the depth's sigma, as a share."""
+"""Change of a value, as a share."""
 RANK = {"": 0, "warning": 1, "error": 2}
 EXPOSURE: FieldPath = ("sensor", "exposure_time")
 LENS: FieldPath = ("scene", "rig", "camera", "lens")
@@ -49,12 +50,14 @@ class Step(NamedTuple):
 class Remedy:
     """A change that brings a read-out nearer to its range, and none out of it.
 
-    key: of the read-out's row; gain: the read-out before and after; project: with the change.
+    key: of the read-out's row; gain: what is better, that read-out first, before and after; price: what is worse,
+    empty for nothing; project: with the change.
     """
 
     key: str
     label: str
     gain: str
+    price: str
     project: Project
 
 
@@ -73,20 +76,36 @@ def remedies(look: Look, laser: int, look_at: Callable[[Project], Look]) -> tupl
             then = readouts(look_at(project), laser)
             after = {one.key: one for one in rows(then)}
             if _helps(row.key, before, after):
-                gain = f"{row.label.lower()} {_gained(row, after[row.key])}"
-                if _differ(now.depth_sigma, then.depth_sigma):
-                    gain += f", depth noise {_gained(before['sigma'], after['sigma'])}"
-                if not now.speckled and _differ(now.speckled_sigma, then.speckled_sigma):
-                    speckled = (micrometres(one.speckled_sigma or 0.0) for one in (now, then))
-                    gain += f", with speckle from {' to '.join(speckled)} µm"
-                found.append(Remedy(row.key, label, gain, project))
+                better, worse = _weighed(row.key, now, then)
+                gain = ", ".join([f"{row.label.lower()} {_gained(row, after[row.key])}", *better])
+                found.append(Remedy(row.key, label, gain, ", ".join(worse), project))
                 break
     return tuple(found)
 
 
-def _differ(before: float | None, after: float | None) -> bool:
-    """By more than is passed over."""
-    return bool(before and after) and abs((after or 0.0) / (before or 1.0) - 1.0) > TOLD_FROM
+def _weighed(key: str, now: Readouts, then: Readouts) -> tuple[list[str], list[str]]:
+    """What becomes better beside the read-out of a key, and what becomes worse: of all these less is better."""
+    before, after = ({row.key: row for row in rows(one)} for one in (now, then))
+    values = [
+        (before[name].label.partition(",")[0].lower(), _gained(before[name], after[name]), was, will)
+        for name, was, will in (
+            ("saturated", now.saturated, then.saturated),
+            ("occluded", now.occluded, then.occluded),
+            ("blur", now.blur_px and now.blur_px.high, then.blur_px and then.blur_px.high),
+            ("sigma", now.depth_sigma, then.depth_sigma),
+        )
+        if name != key and before[name].value != after[name].value and NOTHING not in _values(before, after, name)
+    ]
+    if not now.speckled and NOTHING not in _values(before, after, "sigma"):
+        was, will = now.speckled_sigma or 0.0, then.speckled_sigma or 0.0
+        values.append(("depth noise with speckle", f"from {micrometres(was)} to {micrometres(will)} µm", was, will))
+    better = [f"{name} {told}" for name, told, was, will in values if (will or 0.0) < (1.0 - TOLD_FROM) * (was or 0.0)]
+    worse = [f"{name} {told}" for name, told, was, will in values if (will or 0.0) > (1.0 + TOLD_FROM) * (was or 0.0)]
+    return better, worse
+
+
+def _values(before: dict[str, Row], after: dict[str, Row], name: str) -> tuple[str, str]:
+    return before[name].value, after[name].value
 
 
 def automatic_exposure(project: Project, now: Readouts) -> Change | None:
@@ -94,10 +113,15 @@ def automatic_exposure(project: Project, now: Readouts) -> Change | None:
 
     InputError: it would be beyond what an exposure may be.
     """
+    times = _filling(now, now.brightest)
+    return None if times is None else _changed(project, _exposed_by(project, times))
+
+
+def _filling(now: Readouts, lifted: float) -> float | None:
+    """Times the exposure that fills FILLED of the full well; lifted: `Readouts.brightest`; None: no line."""
     if now.peak_electrons is None or not now.peak_electrons.high > 0.0:
         return None
-    most = now.brightest * now.peak_electrons.high
-    return _changed(project, _exposed_by(project, FILLED * now.full_well / most))
+    return FILLED * now.full_well / (lifted * now.peak_electrons.high)
 
 
 def lit_point(look: Look, laser: int) -> Float:
@@ -117,7 +141,7 @@ def _changes(key: str, look: Look, laser: int, now: Readouts) -> Iterator[Change
         "occluded": tuple(_turned(angle) for angle in ANGLES[1:]),
         "working": (_aimed,),
         "width": (_sheet,),
-        "blur": (_focused, _stopped_down),
+        "blur": (_focused, _stopped_down, _stopped_down_and_filled),
     }
     for attempt in tries.get(key, ()):
         try:
@@ -191,15 +215,42 @@ def _focused(look: Look, laser: int, now: Readouts) -> Change | None:
 
 def _stopped_down(look: Look, laser: int, now: Readouts) -> Change | None:
     """Focused, and stopped down until the line is sharp, exposed longer by what that costs of light."""
-    if now.distance is None or now.blur_px is None:
+    number = _sharp_stop(look.project, now)
+    # a line that saturates would be as saturated again
+    return None if number is None or (now.saturated or 0.0) > SATURATED else _stopped(look.project, now, number, 1.0)
+
+
+def _stopped_down_and_filled(look: Look, laser: int, now: Readouts) -> Change | None:
+    """The same, at the exposure that fills FILLED of the full well there."""
+    number = _sharp_stop(look.project, now)
+    if number is None:
         return None
-    project, before = look.project, look.project.scene.camera.lens.f_number
-    # at best focus the blur left is about half of the depth's share
-    number = next((stop for stop in STOPS if stop >= before * max(1.0, now.blur_px.high / SHARP_PX)), None)
-    if number is None or number <= before:
+    scene = replaced(look.project, (*LENS, "f_number"), number).scene
+    lifted = brightest(look.project.sensor, scene.camera, scene.lasers[laser].wavelength_nm, RARE)
+    times = _filling(now, lifted)
+    return None if times is None else _stopped(look.project, now, number, times)
+
+
+def _sharp_stop(project: Project, now: Readouts) -> float | None:
+    """The first one at which the line is sharp when focused on; None: no smaller aperture is needed, or there is none.
+
+    At best focus the blur left is about half of the depth's share.
+    """
+    before = project.scene.camera.lens.f_number
+    if now.blur_px is None:
         return None
+    number = next((stop for stop in STOPS if stop >= before * max(1.0, now.blur_px.high / SHARP_PX)), before)
+    return number if number > before else None
+
+
+def _stopped(project: Project, now: Readouts, number: float, times: float) -> Change | None:
+    """times: the exposure beside what the aperture costs of light."""
+    if now.distance is None:
+        return None
+    before = project.scene.camera.lens.f_number
     aperture = Step(f"f/{before:g} → f/{number:g}", (*LENS, "f_number"), number)
-    return _changed(project, aperture, _focus(project, now.distance), _exposed_by(project, (number / before) ** 2))
+    exposure = _exposed_by(project, times * (number / before) ** 2)
+    return _changed(project, aperture, _focus(project, now.distance), exposure)
 
 
 def _focus(project: Project, distance: Range) -> Step | None:
@@ -227,7 +278,7 @@ def _changed(project: Project, *steps: Step | None) -> Change:
 
 def _helps(key: str, before: dict[str, Row], after: dict[str, Row]) -> bool:
     """The read-out is better by a level, and no other is worse."""
-    better = RANK[after[key].level] < RANK[before[key].level] and after[key].value != "-"
+    better = RANK[after[key].level] < RANK[before[key].level] and after[key].value != NOTHING
     return better and all(RANK[row.level] <= RANK[before[row.key].level] for row in after.values() if row.key in before)
 
 

@@ -9,13 +9,15 @@ from typing import Any
 
 from render.base.errors import InputError
 from studio.project.project import READ_OFF, Project
-from studio.study.changes import changes
+from studio.study.changes import Change, changes
 from studio.study.store import FILE, described
 from studio.study.study import Study, field_place, parts_of
 
 OF_NO_CELL = ("name", "extraction.method")
 """Fields that a cell has of its own, or does not have, whatever a study varies."""
 MOST_TOLD = 4
+LONGEST = 40
+"""Characters of a list that is told."""
 
 
 def as_begun(study: Study, bases: Mapping[str, Project], begun: Mapping[str, Project]) -> dict[str, Project]:
@@ -57,7 +59,7 @@ def set_apart(
             told.append(f"Base project: {', '.join(sorted(begun_with))} in the folder, {name} now")
             continue
         read = base if _asked(study, base) != _asked(study, before) else base.read_as(before)
-        told += [f"{one.label}: {one.a} in the folder, {one.b} now" for one in changes(before, read)]
+        told += [_told(one) for one in changes(before, read)]
     return tuple(dict.fromkeys(told))
 
 
@@ -65,6 +67,18 @@ def told_apart(apart: tuple[str, ...]) -> str:
     """In one line, the first few of them."""
     more = len(apart) - MOST_TOLD
     return "; ".join(apart[:MOST_TOLD]) + (f"; and {more} more" if more > 0 else "")
+
+
+def _told(change: Change) -> str:
+    """Of long lists, as those of a calibration, only whether there is one."""
+    there, now = ("one" if _is_long(value) else value for value in (change.a, change.b))
+    if there == now == "one":
+        return f"{change.label}: another one in the folder"
+    return f"{change.label}: {there} in the folder, {'there is one' if now == 'one' else now} now"
+
+
+def _is_long(value: str) -> bool:
+    return value.startswith(("[", "{")) and len(value) > LONGEST
 
 
 def _before(bases: Mapping[str, Project], begun: Mapping[str, Project]) -> dict[str, Project]:

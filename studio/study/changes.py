@@ -77,7 +77,7 @@ def _unit_of(field: str) -> str:
 
 
 def _shown(value: Any, unit: Unit) -> str:
-    if value is None:
+    if value is None or value == ():
         return "none"
     if isinstance(value, bool):
         return "yes" if value else "no"

@@ -41,6 +41,8 @@ class Estimate:
     """Of the longest motion of its projects, of which every cell measures the first."""
     doubts: tuple[str, ...] = ()
     """What figures at its image scale are worth."""
+    left_over: int = 0
+    """Cells of the folder with values that are no longer asked for."""
 
 
 def estimate(
@@ -68,7 +70,16 @@ def estimate(
     size = study_bytes(study, len(rows) + cells + searched)
     steps = max(base.scene.frame_count for base in bases.values())
     known = None if math.isnan(seconds) else seconds
-    return Estimate(cells, renders, searched, known, size, steps, small_image_doubts(study, bases))
+    doubts = small_image_doubts(study, bases)
+    return Estimate(cells, renders, searched, known, size, steps, doubts, _left_over(study, bases, rows))
+
+
+def _left_over(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> int:
+    asked: set[str] = set()
+    for number in range(len(study.sweeps)):
+        for cell, _ in measured_cells(study, number, bases, rows):
+            asked |= {cell.key, cell.former_key}
+    return len(rows.keys() - asked)
 
 
 def costs(study: Study, bases: Mapping[str, Project], number: int) -> Costs:

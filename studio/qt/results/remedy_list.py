@@ -68,7 +68,7 @@ class RemedyList(QWidget):
 
     def _show(self, found: tuple[Remedy, ...]) -> None:
         self.setVisible(bool(found))
-        if [(one.label, one.gain) for one in found] == [(one.label, one.gain) for one in self.found]:
+        if [sentence(one) for one in found] == [sentence(one) for one in self.found]:
             self.found = found
             return
         self.found = found
@@ -94,6 +94,6 @@ class RemedyList(QWidget):
 
 
 def sentence(remedy: Remedy) -> str:
-    """What is done, and what it gains."""
+    """What is done, what it gains, and what that costs."""
     label = remedy.label if remedy.label.startswith("f/") else remedy.label[:1].upper() + remedy.label[1:]
-    return f"{label}: {remedy.gain}"
+    return f"{label}: {remedy.gain}" + (f", at the cost of {remedy.price}" if remedy.price else "")

@@ -290,8 +290,9 @@ class StudyPanel(QWidget):
 
 def estimate_text(told: Estimate, processors: int) -> str:
     """ "40 cells of 10 renders to go, about 2:10 on 2 processors, 0.3 MB", and what to know of figures at its scale."""
+    notes = [left_over_text(told.left_over), *told.doubts] if told.left_over else told.doubts
     if told.cells + told.searched == 0:
-        return " ".join(["Every cell is measured.", *told.doubts])
+        return " ".join(["Every cell is measured.", *notes])
     parts = [f"{told.cells} cells of {told.renders} renders to go"]
     if told.steps > 1:
         parts.append(f"step 1 of {told.steps} alone")
@@ -300,4 +301,10 @@ def estimate_text(told: Estimate, processors: int) -> str:
     if told.seconds is not None:
         parts.append(f"about {duration(told.seconds / processors)} on {processors} processors")
     parts.append(f"{told.bytes / 1e6:.1f} MB")
-    return "\n".join([", ".join(parts), *told.doubts])
+    return "\n".join([", ".join(parts), *notes])
+
+
+def left_over_text(cells: int) -> str:
+    if cells == 1:
+        return "1 measured cell is of values that are no longer asked for (it stays in the folder)."
+    return f"{cells} measured cells are of values that are no longer asked for (they stay in the folder)."

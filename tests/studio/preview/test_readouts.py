@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -166,9 +167,12 @@ def test_depth_noise_is_that_of_the_sensor_as_it_is_set() -> None:
 def test_depth_noise_says_where_it_takes_the_line_to_be_sharp_and_unsaturated() -> None:
     blurred = replaced(sample("plane"), (*CAMERA, "lens", "focus_distance"), 0.3)
     exposed = replaced(sample("plane"), ("sensor", "exposure_time"), 4 * sample("plane").sensor.exposure_time)
-    for project, told in ((sample("plane"), ""), (blurred, "as if in focus"), (exposed, "as if unsaturated")):
+    for project, told in ((sample("plane"), ""), (blurred, "as if in focus, "), (exposed, "saturated")):
         found = next(row for row in rows(read(project, "plane")) if row.key == "sigma")
-        assert (told in found.note and found.level == "warning") if told else "as if" not in found.note
+        assert (found.note.startswith(told) and found.level == "warning") if told else "as if" not in found.note
+        assert (found.value == NOTHING) == (project is exposed), "more light would make it look better"
+    some = replace(read(sample("plane"), "plane"), saturated=0.3)
+    assert next(row for row in rows(some) if row.key == "sigma").note.startswith("as if unsaturated, with speckle ")
 
 
 @pytest.mark.parametrize(("times", "least", "most"), [(0.6, 0.0, 0.1), (1.0, 0.3, 0.7), (1.5, 0.95, 1.0)])

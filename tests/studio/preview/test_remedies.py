@@ -73,7 +73,7 @@ def test_a_sheet_is_brought_to_a_width_that_measures_well(angle: float, width: f
     remedy = next(one for one in found if one.key == "width")
     seen = read(remedy.project).width_px
     assert seen is not None and seen.middle == pytest.approx(width, rel=0.01)
-    assert "mrad" in remedy.label and remedy.gain.endswith("µm")
+    assert "mrad" in remedy.label and remedy.gain.startswith("line width, sigma from ")
 
 
 def test_a_laser_beside_the_camera_is_turned_away_about_the_line() -> None:
@@ -120,6 +120,8 @@ WRONG: tuple[tuple[str, dict[tuple[Any, ...], Any]], ...] = (
     ("plane", {(*LENS, "focus_distance"): 0.2}),
     ("plane", {(*LENS, "focus_distance"): None}),
     ("v_groove", {(*LENS, "f_number"): 1.4}),
+    ("sphere", {(*LENS, "f_number"): 1.4, (*LENS, "focus_distance"): 0.8161}),
+    *((name, {}) for name in sorted(path.name for path in ROOT.parent.iterdir() if (path / "project.json").is_file())),
 )  # fmt: skip
 
 
@@ -163,9 +165,44 @@ def test_a_gain_reads_from_what_it_is_to_what_it_will_be(proposed: list[tuple[Pr
     for _, remedy in proposed:
         assert re.search(r" from \S.* to \S", remedy.gain) and "→" not in remedy.gain
     _, (remedy,) = found_for({("sensor", "exposure_time"): 0.5})
-    assert remedy.gain.startswith("saturated from 100% to 0% of the scan lines, depth noise from ")
+    assert remedy.gain == "saturated from 100% to 0% of the scan lines", "of what saturates no noise is known"
     _, found = found_for({(*LENS, "focus_distance"): 0.2})
     assert re.match(r"defocus blur from \d+\.\d to \d+\.\d px", found[0].gain)
+
+
+def test_what_is_told_as_a_gain_is_better_and_what_is_worse_is_the_price(
+    proposed: list[tuple[Project, Remedy]],
+) -> None:
+    """A smaller aperture told of more noise by speckle as if it gained by that."""
+    priced = [remedy.price for _, remedy in proposed if remedy.price]
+    assert any(re.fullmatch(r"depth noise with speckle from 245 to 312 µm", price) for price in priced)
+    for _, remedy in proposed:
+        gains = [part for part in remedy.gain.split(", ")[1:] if not part.startswith("sigma from")]
+        for better, parts in ((True, gains), (False, remedy.price.split(", ") if remedy.price else [])):
+            for part in parts:
+                told = re.search(r" from ([\d.,]+)\S*(?: \S+)? to ([\d.,]+)", part)
+                assert told is not None, part
+                was, will = (float(value.replace(",", "")) for value in told.groups())
+                assert will != was and (will < was) == better, f"{remedy.label}: {part}"
+
+
+def test_no_proposal_leaves_the_line_saturated_by_its_own_exposure() -> None:
+    """f/1.4 -> f/4 went with an exposure eight times as long, of a line at 14 times the full well."""
+    root = template_folder("sphere")
+    for speckled in ("off", "polarised"):
+        project = Project.load(root / "project.json")
+        for path, value in (
+            ((*LENS, "f_number"), 1.4),
+            ((*LENS, "focus_distance"), 0.8161),
+            (("sensor", "speckle"), speckled),
+        ):
+            project = replaced(project, path, value)
+        found = remedies(PREVIEW.look(project, root), 0, partial(PREVIEW.look, root=root))
+        assert {"saturated", "blur"} <= {one.key for one in found}
+        for one in found:
+            if one.project.sensor.exposure_time != project.sensor.exposure_time:
+                after = readouts(PREVIEW.look(one.project, root), 0)
+                assert after.saturated is not None and after.saturated < 0.01, one.label
 
 
 def test_a_proposal_puts_no_other_read_out_out_of_range() -> None:

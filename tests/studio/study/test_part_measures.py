@@ -13,7 +13,7 @@ from analysis.gauges.gauge import Gauge
 from render.base.errors import InputError
 from studio.project.project import Project
 from studio.runtime.workers import Engine
-from studio.study.as_begun import begun_in, set_apart
+from studio.study.as_begun import begun_in, set_apart, told_apart
 from studio.study.begin import begin
 from studio.study.cells import next_cells
 from studio.study.measures import measure_of, part_names
@@ -120,6 +120,25 @@ def test_another_set_up_is_told_by_the_fields_that_differ(tmp_path: Path) -> Non
     )
     with pytest.raises(InputError, match="Bit depth: 12 in the folder, 8 now"), begin(tmp_path, study, now, Engine(1)):
         pass
+
+
+def test_a_calibration_that_was_taken_over_since_is_told_without_its_numbers() -> None:
+    study, bases = study_of("depth_rmse")
+    base = bases["step_block"]
+
+    def calibrated(distance: float) -> dict[str, Project]:
+        plane, matrix = (
+            [0.9743806882629759, 0.0, -0.2249053, distance],
+            [[0.0252 * (i == j) for j in range(8)] for i in range(8)],
+        )
+        found = {"calibration.covariances": [matrix], "calibration.planes": [plane]}
+        return {"step_block": base.replaced(found).in_folder(base.folder)}
+
+    first = set_apart(study, calibrated(-0.1), study, bases)
+    assert [one.rpartition("Laser planes: ")[2] for one in first[:1]] == ["none in the folder, there is one now"]
+    assert told_apart(first).count("there is one now") == 2 and "0.97" not in told_apart(first)
+    (second,) = set_apart(study, calibrated(-0.2), study, calibrated(-0.1))
+    assert second.endswith("Laser planes: another one in the folder")
 
 
 def test_digests_of_meshes_that_saving_writes_lock_nothing_out(tmp_path: Path) -> None:

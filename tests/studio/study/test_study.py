@@ -12,8 +12,9 @@ import pytest
 from render.base.errors import InputError
 from studio.project.project import Project
 from studio.study.cells import cells_at, check_size, next_cells, points
+from studio.study.estimate import estimate
 from studio.study.study import Study, ready_made, with_fields
-from studio.study.tables import measured_cells
+from studio.study.tables import SECONDS, measured_cells
 
 SWEEP: dict[str, Any] = {"name": "a", "vary": [{"field": "sensor.exposure_time", "values": [0.001, 0.002]}]}
 
@@ -146,6 +147,19 @@ def test_a_range_that_is_extended_keeps_the_cells_that_are_there(
     rows = {cell.key: {} for cell in next_cells(fewer, bases_of(fewer), {})}
     left = next_cells(more, bases_of(more), rows)
     assert {cell.point for cell in left} == set(points(more.sweeps[0])[small[2] :])
+
+
+def test_cells_of_values_that_are_no_longer_asked_for_are_counted() -> None:
+    """Of four steps in a range two are among five; 12 new cells were told, and not that 6 dropped out of the chart."""
+    fewer, more = (
+        study_of({"name": "a", "vary": [{"field": "sensor.exposure_time", "low": 1e-3, "high": 1e-2, "count": count}]})
+        for count in (4, 5)
+    )
+    seconds = dict.fromkeys(SECONDS, 1.0)
+    rows = {cell.key: seconds for cell in next_cells(fewer, bases_of(fewer), {})}
+    assert estimate(fewer, bases_of(fewer), rows, {}).left_over == 0
+    told = estimate(more, bases_of(more), rows, {})
+    assert (told.cells, told.left_over) == (9, 6)
 
 
 def test_cells_that_were_named_by_every_bit_of_their_values_are_still_known() -> None:

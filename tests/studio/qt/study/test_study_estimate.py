@@ -15,9 +15,10 @@ from studio.project.templates import template_folder
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session, one_of
-from studio.qt.study.study_panel import StudyPanel
+from studio.qt.study.study_panel import StudyPanel, estimate_text
 from studio.qt.study.study_work import StudyWork
 from studio.runtime.jobs import Job
+from studio.study.estimate import Estimate
 from tests.studio.qt.shell.window_hands import until_cancelled
 
 
@@ -87,6 +88,15 @@ def test_what_a_small_image_makes_of_the_figures_is_told_before_it_runs(panel: S
     assert "each pixel is 4 times as large" in at(0.25) and "not the scanner's" in panel.told.text()
     assert "too thin for its methods" not in at(1.0) and "not the scanner's" not in panel.told.text()
     assert "px wide there (sigma), too thin for its methods" in at(0.05)
+
+
+def test_measured_cells_that_drop_out_are_told_beside_those_to_come() -> None:
+    told = estimate_text(Estimate(12, 3, 0, 60.0, 1_000_000, left_over=8), 2)
+    first, second = told.split("\n")
+    assert first.startswith("12 cells of 3 renders to go, about ")
+    assert second == "8 measured cells are of values that are no longer asked for (they stay in the folder)."
+    assert "1 measured cell is of values" in estimate_text(Estimate(0, 0, 0, 0.0, 0, left_over=1), 2)
+    assert estimate_text(Estimate(0, 0, 0, 0.0, 0), 2) == "Every cell is measured."
 
 
 def test_no_sentence_widens_the_panel(panel: StudyPanel, qtbot: QtBot) -> None:
