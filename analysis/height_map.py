@@ -27,6 +27,12 @@ LEVELS = 65535
 """Of 16 bits, less 0, which says that there is no height."""
 FINEST = 1e-9
 """m a level at least."""
+NEAREST = 8
+"""Points, one of whose triangles is continued to a cell at the border."""
+FARTHEST = 3.0
+"""Sum of the sizes of such a cell's three weights at most: 1 within a triangle, more as noise grows."""
+THIN = 0.3
+"""Of the usual height of a triangle: a thinner one, of points of one scan line, is no plane to continue."""
 CHUNK = 1 << 18
 """Cells at a time."""
 Means = tuple[NDArray[np.intp], Float, NDArray[np.intp]]
@@ -53,11 +59,17 @@ class HeightMap:
     steep: int = 0
     """Cells without a height as the surface there is a wall or a jump, or their points contradict each other."""
     points_without: int = 0
-    """Points within cells without a height."""
+    """Points within cells without a height, and beyond the map."""
+    points_steep: int = 0
+    """Those of them that are within the steep cells."""
+    unmeasured: int = 0
+    """Cells without a height as nothing was measured there: over holes, and outside of the scanned area."""
 
 
 def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
     """Heights by linear interpolation between a cloud's points, in Delaunay triangles, except at walls and jumps.
+
+    At the border the next triangle is continued, by half a cell or half of what points are apart.
 
     pitch: m, None for as many cells as there are points. A height is a mean of three points, w^T z, so that its
     variance is w^T C w, C with the correlation of neighbouring scan lines; neighbours that share points err alike.
@@ -85,16 +97,19 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
     # a stray point far from the others is of no triangle that counts: the map ends where surface does
     left, bottom = corners[is_surface].min(axis=(0, 1))
     right, top = corners[is_surface].max(axis=(0, 1))
-    columns, rows = (int(min(length / pitch, 1e9)) + 1 for length in (right - left, top - bottom))
+    columns, rows = (round(min(length / pitch, 1e9)) + 1 for length in (right - left, top - bottom))
     if columns * rows > MOST_CELLS:
         found, allowed = f"{columns} x {rows} cells of {pitch:g} m", f"at most {MOST_CELLS} cells"
         raise InputError("the height map would be too large", found=found, allowed=allowed, cure="give a larger pitch")
     heights, sigma, covariance = (np.full(rows * columns, np.nan) for _ in range(3))
     usual = _median(cloud["sigma_random"])
     steep = steep_triangles(corners, cloud["z"][mesh.simplices], mesh.simplices, is_surface, usual)
-    grid = _Grid(cloud, pitch, columns, float(left), float(top), mesh, is_surface)
+    # what touches a wall tells nothing of how the surface goes on
+    beside_wall = np.isin(mesh.simplices, mesh.simplices[is_surface & steep]).any(axis=1)
+    border = _Border(mesh, cloud["z"], is_surface & ~beside_wall, usual)
+    grid = _Grid(cloud, pitch, columns, float(left), float(top), mesh, is_surface, border)
     own, lowest, highest = grid.own_points(rows)
-    without = 0
+    is_steep = np.zeros(rows * columns, dtype=np.bool_)
     for start in range(0, rows * columns, CHUNK):
         cells = np.arange(start, min(start + CHUNK, rows * columns))
         here, beside = grid.weights(cells), grid.weights(cells + 1)
@@ -104,7 +119,8 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
         covariance[cells] = np.where(known, grid.covariance(here, beside), np.nan)
         wrong = contradicted(heights[cells], steep[here[2]], lowest[cells], highest[cells], pitch, usual)
         heights[cells[wrong]] = sigma[cells[wrong]] = np.nan
-        without += int(np.count_nonzero(wrong))
+        is_steep[cells] = wrong
+    is_empty, inside = np.isnan(heights), own[own >= 0]
     together = covariance[:-1] / (sigma[:-1] * sigma[1:])
     return HeightMap(
         heights.reshape(rows, columns),
@@ -115,8 +131,10 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
         usual,
         _median(sigma),
         _median(together),
-        without,
-        int(np.count_nonzero(np.isnan(heights[own[own >= 0]]))) + int(np.count_nonzero(own < 0)),
+        int(np.count_nonzero(is_steep)),
+        int(np.count_nonzero(is_empty[inside])) + len(own) - len(inside),
+        int(np.count_nonzero(is_steep[inside])),
+        int(np.count_nonzero(is_empty & ~is_steep)),
     )
 
 
@@ -194,6 +212,53 @@ def along(made: HeightMap, start: tuple[float, float], end: tuple[float, float])
     return share * length * made.pitch, heights
 
 
+class _Border:
+    """Continues the surface where it ends."""
+
+    def __init__(self, mesh: Delaunay, z: Float, is_flat: NDArray[np.bool_], sigma: float) -> None:
+        """z: (m,) m; is_flat: (t,) triangles that are surface, and beside no wall; sigma: m, NaN for unknown."""
+        from scipy.spatial import cKDTree
+
+        self.mesh, self.z, self.noise = mesh, z, FARTHEST * float(np.nan_to_num(sigma))
+        self.points = cKDTree(mesh.points)
+        self.apart = float(np.median(self.points.query(mesh.points, k=2, p=np.inf)[0][:, 1]))
+        """m, from a point to the next one, as usual."""
+        (flat,) = np.nonzero(is_flat)
+        corners = mesh.points[mesh.simplices[flat]]
+        first, second = (corners[:, i] - corners[:, 0] for i in (1, 2))
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        thickness = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / longest
+        thick = thickness > THIN * _median(thickness)
+        slope = np.ptp(z[mesh.simplices[flat]], axis=1) / longest
+        steepest_first = flat[thick][np.argsort(-slope[thick])]
+        self.flattest = np.full(len(mesh.points), -1)
+        """(m,) of the triangles at each point."""
+        self.flattest[mesh.simplices[steepest_first].ravel()] = np.repeat(steepest_first, 3)
+
+    def continued(self, place: Float, pitch: float) -> tuple[NDArray[np.intp], Float]:
+        """(n,) triangles and (n, 3) weights of places in no triangle that counts, NaN where no point is near."""
+        found, weight = np.full(len(place), -1), np.full((len(place), 3), np.nan)
+        reach = 0.5 * max(pitch, self.apart) * (1.0 + 1e-9)
+        (near,) = np.nonzero(np.isfinite(self.points.query(place, p=np.inf, distance_upper_bound=reach)[0]))
+        away, beside = self.points.query(place[near], k=min(NEAREST, len(self.z)))
+        # where the surface is steeper than 45 degrees nobody knows how it goes on
+        least = away[:, 0] + self.noise
+        for triangle in self.flattest[beside].T:
+            tried = _weights(self.mesh, triangle, place[near])
+            # of several continuations the one that makes up least
+            rise = np.abs((tried * self.z[self.mesh.simplices[triangle]]).sum(axis=1) - self.z[beside[:, 0]])
+            better = (triangle >= 0) & (np.abs(tried).sum(axis=1) < FARTHEST) & (rise < least)
+            found[near[better]], weight[near[better]], least[better] = triangle[better], tried[better], rise[better]
+        return found, weight
+
+
+def _weights(mesh: Delaunay, triangles: NDArray[np.intp], place: Float) -> Float:
+    """(n, 3) barycentric coordinates of places in a triangle each."""
+    transform = mesh.transform[triangles]
+    two = np.einsum("nij,nj->ni", transform[:, :2], place - transform[:, 2])
+    return np.column_stack([two, 1.0 - two.sum(axis=1)])
+
+
 @dataclass(frozen=True)
 class _Grid:
     """Cells row by row over a triangulation."""
@@ -208,16 +273,16 @@ class _Grid:
     mesh: Delaunay
     is_surface: NDArray[np.bool_]
     """(t,) triangles that bridge no gap."""
+    border: _Border
 
     def weights(self, cells: NDArray[np.intp]) -> Means:
         row, column = np.divmod(cells, self.columns)
         place = np.column_stack([self.left + column * self.pitch, self.top - row * self.pitch])
         # a hair of tolerance, so that the cells on the hull are of its triangles
         found = self.mesh.find_simplex(place, tol=1e-9)
-        transform = self.mesh.transform[found]
-        two = np.einsum("nij,nj->ni", transform[:, :2], place - transform[:, 2])
-        weight = np.column_stack([two, 1.0 - two.sum(axis=1)])
-        weight[(found < 0) | ~self.is_surface[found]] = np.nan
+        weight = _weights(self.mesh, found, place)
+        (empty,) = np.nonzero((found < 0) | ~self.is_surface[found])
+        found[empty], weight[empty] = self.border.continued(place[empty], self.pitch)
         return self.mesh.simplices[found], weight, found
 
     def own_points(self, rows: int) -> tuple[NDArray[np.intp], Float, Float]:

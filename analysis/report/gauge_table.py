@@ -12,6 +12,8 @@ from analysis.report.units import NONE, digits
 COLUMNS = ("kind", "value", "sigma", "nominal", "tolerance", "verdict", "error", "error / sigma")
 MARKS = {"pass": "✓\u00a0pass", "fail": "✗\u00a0fail", "undecided": "?\u00a0undecided"}
 """Never by colour alone."""
+MISSES = "points miss "
+"""How remarks begin that the points are not of the fitted curve, with what else is told before them."""
 COUNTED = ("pass", "undecided", "fail", "no tolerance", "none")
 """Verdicts in the order in which their counts are told; the last: not measured."""
 PLAIN = str.maketrans({"µ": "u", "²": "2", "°": " deg", "–": "-", "✓": "", "✗": "", "?": "", "\u00a0": " "})  # noqa: RUF001
@@ -104,7 +106,7 @@ def verdict_of(row: Mapping[str, Any]) -> str:
     steps, counts = row["readings"], row.get("verdicts") or {}
     if row["reason"]:
         return f"not measured in any of {steps} steps" if steps > 1 else "not measured"
-    told = verdict_text(row["verdict"], row.get("oblique"))
+    told = marked_verdict(row)
     return f"{told}: {counts_text(counts)}" if steps > 1 and set(counts) - {"no tolerance"} else told
 
 
@@ -120,11 +122,19 @@ def worst_of(row: Mapping[str, Any]) -> str:
     return f"{what}: step {row['step'] + 1} of {row['readings']}"
 
 
-def verdict_text(verdict: str | None, oblique: float | None = None) -> str:
-    """With its mark, and by how much its section is not square to its faces: rad, None or NaN for nothing."""
+def marked_verdict(row: Mapping[str, Any]) -> str:
+    """Of such an entry that has a value, with what is amiss with it."""
+    return verdict_text(row["verdict"], row.get("oblique"), MISSES in (row.get("remark") or ""))
+
+
+def verdict_text(verdict: str | None, oblique: float | None = None, misfit: bool = False) -> str:
+    """With its mark, by how much its section is not square to its faces (rad, None or NaN for nothing), and whether its
+    points miss the fitted curve."""
     told = [MARKS[verdict]] if verdict else []
     if oblique is not None and math.isfinite(oblique):
         told.append(f"{math.degrees(oblique):.1f}° oblique")
+    if misfit:
+        told.append("misfit")
     return ", ".join(told) or NONE
 
 

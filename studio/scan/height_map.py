@@ -13,7 +13,7 @@ import numpy as np
 from analysis.cloud import Cloud, merge, ply_pieces
 from analysis.deviation import far_off
 from analysis.height_map import HeightMap, encoded, height_map, within
-from analysis.report.units import digits
+from analysis.report.units import counted, digits
 from render.base.arrays import Bool
 from render.base.errors import InputError
 from render.base.files import atomic_write
@@ -210,20 +210,32 @@ def left_out_sentence(left_out: dict[str, Any]) -> str:
 
 
 def steep_record(made: HeightMap) -> dict[str, Any]:
-    """Cells that walls, jumps and contradictory points leave without a height, and points in no cell with one."""
-    return {"cells": made.steep, "points_without_height": made.points_without}
+    """Cells that walls, jumps and contradictory points leave without a height, those that were not measured, and points
+    without a height."""
+    return {
+        "cells": made.steep,
+        "points": made.points_steep,
+        "cells_not_measured": made.unmeasured,
+        "points_without_height": made.points_without,
+    }
 
 
 def steep_sentence(steep: dict[str, Any]) -> str:
-    """What `steep` of a record says, for a person; empty where every cell of a surface has a height."""
-    if not steep["cells"]:
-        return ""
-    cells = "1 cell has" if steep["cells"] == 1 else f"{steep['cells']} cells have"
-    points = steep["points_without_height"]
-    return (
-        f"{cells} no height, at walls and jumps, where none is the height of a place; {points} point"
-        f"{' lies' if points == 1 else 's lie'} in cells without one."
-    )
+    """What `steep` of a record says, for a person; empty where every cell has a height."""
+    told, cells, others = [], steep["cells"], steep["cells_not_measured"]
+    if cells:
+        lie = "lies" if steep["points"] == 1 else "lie"
+        told.append(
+            f"{counted(cells, 'cell')} {'has' if cells == 1 else 'have'} no height, at walls and jumps, where none is "
+            f"the height of a place: {counted(steep['points'], 'point')} {lie} in {'it' if cells == 1 else 'them'}."
+        )
+    if others:
+        were = "was" if others == 1 else "were"
+        cells = counted(others, "other cell" if told else "cell")
+        told.append(f"{cells} {were} not measured, over holes or outside of the scanned area.")
+    if apart := steep["points_without_height"] - steep["points"]:
+        told.append(f"{counted(apart, 'point')} there and beside walls {'has' if apart == 1 else 'have'} none.")
+    return " ".join(told)
 
 
 def shown_range(made: HeightMap) -> tuple[float, float] | None:

@@ -55,6 +55,24 @@ def test_a_hole_along_a_profile_has_no_heights_however_far_apart_the_steps_are()
     assert np.abs(made.heights - np.abs(x - middle))[known].max() < 1.5e-3
 
 
+@pytest.mark.parametrize("pitch", [None, 2e-4, 1.3e-3])
+def test_every_point_of_a_plane_is_in_a_cell_with_a_height_in_the_first_and_the_last_scan_line_too(
+    pitch: float | None,
+) -> None:
+    """Scan lines waver by micrometres, and the cells of the first lay beside all triangles: its column was empty."""
+    row, step = (one.ravel() for one in np.meshgrid(np.arange(150), np.arange(6)))
+    x, y = 8e-3 * step + 1e-5 * np.sin(7.0 * row + step), 5e-4 * row
+    z = 0.1 + 0.2 * x - 0.3 * y
+    cloud = {"x": x, "y": y, "z": z, "sigma_random": np.full(len(x), SIGMA), "row": row, "step": step}
+    made = height_map(cloud | {"laser": np.zeros(len(x), dtype=np.int32), "correlation_length": np.ones(len(x))}, pitch)
+    assert made.points_without == made.points_steep == made.steep == 0
+    x, y = places(made)
+    known = np.isfinite(made.heights)
+    assert known[:-1].all() and np.abs(made.heights - (0.1 + 0.2 * x - 0.3 * y))[known].max() < 1e-9
+    assert made.unmeasured == np.count_nonzero(~known), "beyond the end of the scan lines, between two of them"
+    assert made.x < 1e-4 and x.max() > 40e-3 - 0.51 * made.pitch
+
+
 @pytest.mark.parametrize("length", [1.0, 4.0])
 def test_sigma_and_correlation_of_cells_are_those_of_repeated_clouds(length: float) -> None:
     cloud, trials = scan(length=length), 40
@@ -85,6 +103,7 @@ def test_nothing_is_made_up_over_a_gap() -> None:
     made = height_map({name: column[kept] for name, column in cloud.items()}, 4e-4)
     _, y = places(made)
     inside = (y > 4.2e-3) & (y < 8.8e-3)
+    assert made.unmeasured >= inside.sum() and made.steep == 0
     assert np.isnan(made.heights[inside]).all() and np.isfinite(made.heights[y < 2.5e-3]).mean() > 0.9
 
 

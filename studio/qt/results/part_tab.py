@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, value_text, verdict_text
+from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, marked_verdict, value_text
 from analysis.report.units import NONE
 from studio.project.same_lasers import same_lasers
 from studio.qt.core import theme
@@ -311,8 +311,8 @@ class PartTab(QWidget):
             _, value, sigma, _, _, whole_verdict, error, ratio = cells(entry)
             of = "" if entry["readings"] > 1 else self._steps.of_which(gauge)
             # counts have no room beside a name: the tip has them
-            verdict = "not measured" if entry["reason"] else verdict_text(entry["verdict"], entry["oblique"])
-            judged = entry["verdict"] or entry["reason"] or not of
+            verdict = "not measured" if entry["reason"] else marked_verdict(entry)
+            judged = verdict != NONE or not of
             texts[1:] = [value, sigma, error, f"{verdict}{of}" if judged else of.removeprefix(", ")]
             truth = value_text(entry["truth"], entry["sigma"], gauge.unit)
             in_sigmas = "" if ratio == NONE else f" ({ratio} sigma)"

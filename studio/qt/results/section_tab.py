@@ -50,6 +50,10 @@ MM = Unit.named("mm")
 REST_MS = 120
 LOW, WIDE = 330, 480
 """px of height, below which the plot has no room under the fields; of width, from which it has some beside them."""
+WIDEST = 999.0
+"""mm, of what has room for its number and unit."""
+BESIDE_TEXT = 16
+"""px, of a box's frame and padding."""
 FILES = "DXF drawing (*.dxf);;CSV table (*.csv)"
 World = tuple[Cloud, Float, Float, Int]
 """Points, (2, 3) least and largest coordinates of all but a few of them, vertices and triangles of the part."""
@@ -311,9 +315,10 @@ def _box(name: str, unit: Unit, low: float, high: float, value: float, decimals:
     box = UnitBox(unit, low, high, decimals)
     box.setAccessibleName(name)
     box.setValue(value)
-    box.setMinimumWidth(48)
-    box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
     box.setButtonSymbols(UnitBox.ButtonSymbols.NoButtons)  # three side by side have no room for arrows
+    text = f"{-WIDEST:.{decimals}f}{box.suffix()}" if unit is MM else f"{low:.{decimals}f}"
+    box.setMinimumWidth(box.fontMetrics().horizontalAdvance(text) + BESIDE_TEXT)
+    box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
     return box
 
 

@@ -13,12 +13,13 @@ from click.testing import CliRunner
 
 import main
 from analysis.gauges.gauge import Gauge
-from analysis.gauges.read import Reading
+from analysis.gauges.read import MISFITS, OTHER_SHAPE, Reading
 from analysis.report.gauge_table import cells, reasons, worst_of
 from analysis.report.units import NONE
 from render.base.errors import InputError
 from studio.project.project import Project
 from studio.scan.gauging import (
+    judged_over_steps,
     kept_readings,
     measures_record,
     read_each,
@@ -77,6 +78,18 @@ def test_every_row_says_in_which_section_it_was_read(scanned: Path, tmp_path: Pa
 def table(folder: Path) -> list[dict[str, str]]:
     with open(folder / "measures.csv", encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize("remark", [OTHER_SHAPE, *MISFITS.values()])
+def test_points_that_miss_the_curve_are_marked_beside_the_verdict_in_the_report(remark: str) -> None:
+    """The remark stood below the table, and the row had a pass like any other."""
+    gauge = Gauge(name="a", kind="peak", regions=((-0.3, -0.1), (0.0, 0.3)), nominal=0.2, upper=0.1)
+    told = f"the section crosses its faces 13.0° obliquely; {remark.format(63.0)}"
+    one = Reading(gauge, 0, value=0.2, sigma_random=1e-5, sigma_systematic=0.0, remark=told)
+    assert cells(judged_over_steps(gauge, [one]))[5] == "✓\u00a0pass, misfit"
+    assert cells(judged_over_steps(gauge, [replace(one, remark="")]))[5] == "✓\u00a0pass"
+    bare = replace(one, gauge=gauge.model_copy(update={"nominal": None, "upper": None}))
+    assert cells(judged_over_steps(bare.gauge, [bare]))[5] == "misfit"
 
 
 def test_an_oblique_section_stands_beside_the_verdict_in_the_report() -> None:

@@ -14,13 +14,13 @@ from PySide6.QtCore import QPointF
 from pytestqt.qtbot import QtBot
 
 from analysis.height_map import along, height_map, within
+from analysis.report.units import count
 from render.scene.motion import LinearStage
 from studio.project.document import Document, replaced
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Render, Session
 from studio.qt.results.height_map_tab import NOTHING, HeightMapTab, line_sentence
-from studio.scan.deviation import read_cloud
 from studio.scan.height_map import file_range, read_points, steep_record, steep_sentence
 from studio.scan.options import ScanOptions
 from studio.scan.scan import run_scan
@@ -67,8 +67,10 @@ def tab(session: Session, qtbot: QtBot) -> Iterator[HeightMapTab]:
 def test_it_is_the_map_of_the_scans_points(tab: HeightMapTab, scanned: tuple[Path, Path], qtbot: QtBot) -> None:
     made = tab.made
     assert made is not None
-    points = read_cloud(scanned[1] / "points.ply")
+    # with the errors, of which the limits are
+    points = read_points(scanned[1] / "points.ply")
     limits = file_range(points)
+    assert limits is not None
     expected = within(height_map(points), limits)
     np.testing.assert_array_equal(made.heights, expected.heights)
     rows, columns = made.heights.shape
@@ -85,6 +87,19 @@ def test_it_is_the_map_of_the_scans_points(tab: HeightMapTab, scanned: tuple[Pat
     tab.pitch.setValue(2e3 * made.pitch)
     qtbot.waitUntil(lambda: tab.made is not made)
     assert tab.made is not None and tab.made.pitch == pytest.approx(2.0 * made.pitch)
+
+
+def test_cells_and_points_without_a_height_are_told_apart() -> None:
+    """ "95 cells have no height; 1943 points lie in cells without one" read as if the 95 held them all."""
+    record = {"cells": 95, "points": 30, "cells_not_measured": 2034, "points_without_height": 31}
+    assert steep_sentence(record) == (
+        "95 cells have no height, at walls and jumps, where none is the height of a place: 30 points lie in them. "
+        "2\u00a0034 other cells were not measured, over holes or outside of the scanned area. "
+        "1 point there and beside walls has none."
+    ).replace("\u00a0", count(1000)[1])
+    one = {"cells": 0, "points": 0, "cells_not_measured": 1, "points_without_height": 0}
+    assert steep_sentence(one) == "1 cell was not measured, over holes or outside of the scanned area."
+    assert steep_sentence(one | {"cells_not_measured": 0}) == ""
 
 
 def test_the_mouse_reads_a_cell_and_the_line_its_profile(tab: HeightMapTab) -> None:

@@ -13,6 +13,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from pytestqt.qtbot import QtBot
 
 from analysis.gauges.gauge import Gauge
+from analysis.gauges.read import OTHER_SHAPE
 from studio.qt.core.session import Session
 from studio.qt.results.plots import PointedPlots
 from studio.qt.results.results_panel import PART, REGION, ResultsPanel
@@ -317,6 +318,9 @@ def test_an_oblique_section_stands_beside_the_verdict(panel: ResultsPanel) -> No
     normal = panel.part._profiles[0][0].normal
     assert normal is not None and np.nanmax(np.abs(np.linalg.norm(normal, axis=1) - 1.0)) < 1e-9
     assert texts(panel, 0)[-1].endswith("fail, 13.0° oblique") and "square to them it is" in panel.part.told.text()
+    panel.part.readings = (replace(panel.part.readings[0], oblique=np.nan, remark=OTHER_SHAPE.format(63.0)),)
+    panel.part._show()
+    assert texts(panel, 0)[-1].endswith("fail, misfit") and "by 63 times" in panel.part.table.item(0, 4).toolTip()
 
 
 def test_the_hint_names_the_list_of_sections(panel: ResultsPanel) -> None:

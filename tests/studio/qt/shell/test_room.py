@@ -186,6 +186,34 @@ def test_no_text_of_any_panel_is_cut_off(window: MainWindow, qtbot: QtBot, scree
     assert not found, "\n".join(f"{where}: {text}" for where, texts in found.items() for text in texts)
 
 
+def test_the_boxes_of_a_section_show_number_and_unit(window: MainWindow, qtbot: QtBot) -> None:
+    """ "-7.505 m" was seen of -7.505 mm."""
+    before = window.size()
+    open_measured(window, qtbot)
+    window.switch_to("measure")
+    window.rearrange()
+    window.resize(1366, 768 - BAR)
+    window.show_panel("nominal")
+    nominal = window.panels["nominal"]
+    section = nominal.section  # type: ignore[attr-defined]
+    nominal.show_tab(section)  # type: ignore[attr-defined]
+    section.normal.setCurrentIndex(section.normal.count() - 1)
+    cut = []
+    boxes = (*section.through, *section.own, section.thickness)
+    for box, value in zip(boxes, (-7.505, -907.505, 0, -1, 0, 1, 1), strict=True):
+        box.setValue(value)
+    for _ in range(3):
+        QApplication.processEvents()
+    for box in boxes:
+        room, wanted = box.lineEdit().width(), box.fontMetrics().horizontalAdvance(box.text())
+        seen = box.visibleRegion().boundingRect().width()
+        if room < wanted + 4 or seen < box.width():
+            cut.append(f"{box.text()!r} has {room} of {wanted} px, {seen} of {box.width()} seen")
+    window.rearrange()
+    window.resize(before)
+    assert not cut, "\n".join(cut)
+
+
 def test_no_workspace_makes_the_window_larger_than_a_small_screen_at_1_5(window: MainWindow, qtbot: QtBot) -> None:
     """1366 x 768, drawn half as large again; also from one workspace to the next, whose columns are others."""
     before, size = window.size(), QSize(911, 512 - BAR)
