@@ -31,6 +31,8 @@ NEAREST = 8
 """Points, one of whose triangles is continued to a cell at the border."""
 FARTHEST = 3.0
 """Sum of the sizes of such a cell's three weights at most: 1 within a triangle, more as noise grows."""
+GENTLE = 0.3
+"""Rise over the distance from the next point that such a cell may have, beside what noise makes of it."""
 THIN = 0.3
 """Of the usual height of a triangle: a thinner one, of points of one scan line, is no plane to continue."""
 CHUNK = 1 << 18
@@ -241,8 +243,8 @@ class _Border:
         reach = 0.5 * max(pitch, self.apart) * (1.0 + 1e-9)
         (near,) = np.nonzero(np.isfinite(self.points.query(place, p=np.inf, distance_upper_bound=reach)[0]))
         away, beside = self.points.query(place[near], k=min(NEAREST, len(self.z)))
-        # where the surface is steeper than 45 degrees nobody knows how it goes on
-        least = away[:, 0] + self.noise
+        # where the surface is steep nobody knows how it goes on
+        least = GENTLE * away[:, 0] + self.noise
         for triangle in self.flattest[beside].T:
             tried = _weights(self.mesh, triangle, place[near])
             # of several continuations the one that makes up least
