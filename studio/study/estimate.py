@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from analysis.study.breakdown import EXTRA
 from studio.project.project import Project
 from studio.study.begin import study_bytes
-from studio.study.cells import cells_at, check_size, lattice_of, methods_of, next_cells, points
+from studio.study.cells import Cell, cells_at, check_size, lattice_of, methods_of, next_cells, points
 from studio.study.small_images import small_image_doubts
 from studio.study.store import Row
 from studio.study.study import SEARCHES, Study
@@ -70,8 +70,16 @@ def estimate(
     size = study_bytes(study, len(rows) + cells + searched)
     steps = max(base.scene.frame_count for base in bases.values())
     known = None if math.isnan(seconds) else seconds
-    doubts = small_image_doubts(study, bases)
+    doubts = (*small_image_doubts(study, bases), *_not_shared(missing))
     return Estimate(cells, renders, searched, known, size, steps, doubts, _left_over(study, bases, rows))
+
+
+def _not_shared(cells: Sequence[Cell]) -> tuple[str, ...]:
+    """Why cells that differ in their method alone do not share a render."""
+    methods = {cell.project.extraction.method for cell in cells if cell.project.render.goal is not None}
+    if len(methods) < 2:
+        return ()
+    return ("Each method has renders of its own, as the goal is its own depth; with the goal of the image they share.",)
 
 
 def _left_over(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> int:

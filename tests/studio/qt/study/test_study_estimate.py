@@ -90,6 +90,17 @@ def test_what_a_small_image_makes_of_the_figures_is_told_before_it_runs(panel: S
     assert "px wide there (sigma), too thin for its methods" in at(0.05)
 
 
+def test_why_methods_do_not_share_a_render_is_told(panel: StudyPanel, qtbot: QtBot) -> None:
+    def with_fixed(field: str, value: float | None) -> str:
+        panel.work.change_sweep(methods=["likelihood", "phase"])
+        panel.work.change(lambda draft: draft.update(set={field: value}))
+        qtbot.waitUntil(lambda: not panel.work._rest.isActive() and not panel.work.unseen.busy)
+        return panel.told.text()
+
+    assert "Each method has renders of its own" in with_fixed("render.goal.depth", 0.2)
+    assert "renders of its own" not in with_fixed("render.goal", None)
+
+
 def test_measured_cells_that_drop_out_are_told_beside_those_to_come() -> None:
     told = estimate_text(Estimate(12, 3, 0, 60.0, 1_000_000, left_over=8), 2)
     first, second = told.split("\n")
