@@ -48,8 +48,9 @@ LANE = "section"
 NORMALS = {"across x": (1.0, 0.0, 0.0), "across y": (0.0, 1.0, 0.0), "level (across z)": (0.0, 0.0, 1.0)}
 MM = Unit.named("mm")
 REST_MS = 120
-LOW, WIDE = 330, 480
-"""px of height, below which the plot has no room under the fields; of width, from which it has some beside them."""
+LOW, WIDE = 330, 560
+"""px of height, below which the plot has no room under the fields; of width, from which it has some beside them: more
+than both need at least, or a panel that becomes narrow would keep them so."""
 WIDEST = 999.0
 """mm, of what has room for its number and unit."""
 BESIDE_TEXT = 16
