@@ -2,7 +2,7 @@
 
 Only where the truth tells the surface's normals. A flat face says across itself alone where a section is square to it,
 two that are not parallel, or one that is round about one axis, say along which direction they run. A ball has no such
-direction: its own radius follows from where its normals point to.
+direction: its own radius follows from how its normals lean off the plane that cuts it.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@ from studio.preview.view_camera import STANDARD, through, turntable
 from studio.project.document import FieldPath, value_at
 from studio.qt.core import theme
 from studio.qt.core.actions import VIEW_KEYS
+from studio.qt.core.laser_box import laser_of
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.qt.viewport.board_ghost import BoardGhost
@@ -165,9 +166,9 @@ class Viewport(QWidget):
 
     def _laser(self) -> FieldPath:
         """Of the selected laser, else of the first; () without any."""
-        count, selected = len(self.session.project.scene.lasers), self.session.selection
-        own = selected[:3] == LASERS and len(selected) > 3 and int(selected[3]) < count
-        return selected[:4] if own else (*LASERS, 0) if count else ()
+        count, selected = len(self.session.project.scene.lasers), laser_of(self.session.selection)
+        own = selected if selected is not None and selected < count else 0
+        return (*LASERS, own) if count else ()
 
     def _clicked(self, x: float, y: float) -> None:
         if self.typed.active:
