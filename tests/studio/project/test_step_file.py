@@ -96,6 +96,47 @@ def test_a_pin_has_its_size_in_the_units_of_its_file_and_facets_within_the_chord
         assert red > 0.5 and max(green, blue) < 0.1
 
 
+@pytest.mark.parametrize("lacks", ["a face", "a part", "everything"])
+def test_what_the_quick_triangulation_leaves_out_is_asked_of_the_thorough_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lacks: str
+) -> None:
+    """A face without facets leaves its part open, or missing where the part has no other face."""
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
+    nodes = [{"name": "box", "mesh": 0}, {"name": "ball", "mesh": 1}, {"name": "box again", "mesh": 0}]
+    whole = parts_of(glb({"box": [(BOX, RED)], "ball": [(BOX, RED)]}, nodes), "boxes")
+    quick = {
+        "a face": parts_of(glb({"box": [(BOX[1:], RED)], "ball": [(BOX, RED)]}, nodes), "boxes"),
+        "a part": parts_of(glb({"box": [(BOX, RED)]}, [nodes[0], nodes[2]]), "boxes"),
+    }
+    asked: list[str] = []
+
+    def converted(file: Path, chord_mm: str, triangulation: str, patience: float) -> list[Part]:
+        asked.append(triangulation)
+        if triangulation == "watson":
+            return whole
+        if lacks == "everything":
+            raise InputError("OpenCASCADE ended")
+        return quick[lacks]
+
+    monkeypatch.setattr("studio.project.step_file._converted", converted)
+    file = tmp_path / "part.step"
+    file.write_text("ISO-10303-21;\n#1=MANIFOLD_SOLID_BREP('box',#2);\n#3=MANIFOLD_SOLID_BREP('ball',#4);\n")
+    assert read_step(file, 1e-5) == whole and asked == ["delabella", "watson"]
+    quick[lacks] = whole
+    if lacks != "everything":
+        assert read_step(file, 1e-5) == whole and asked[2:] == ["delabella"]
+
+
+@needs_cascadio
+def test_both_triangulations_make_the_same_facets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "pin.step"
+    file.write_text(pin(10.0, 40.0, "mm"))
+    (quick,) = read_step(file, 5e-6)
+    monkeypatch.setattr("studio.project.step_file.QUICK", "watson")
+    (thorough,) = read_step(file, 5e-6)
+    assert np.array_equal(quick.vertices, thorough.vertices) and len(quick.triangles) == len(thorough.triangles)
+
+
 @needs_cascadio
 @pytest.mark.parametrize("text", ["solid pin", "ISO-10303-21;\nrubbish", "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n"])
 def test_what_is_no_step_file_leaves_a_message_and_no_files(tmp_path: Path, text: str) -> None:
