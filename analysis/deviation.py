@@ -38,6 +38,8 @@ LEVER = 1e-3
 """The same of six spots, each of which counts: how short the levers between them may be."""
 HELD_BY = ("primary 1", "primary 2", "primary 3", "secondary 1", "secondary 2", "tertiary")
 FEWEST = 6
+COVERAGE = 2.0
+"""Sigmas of a point's uncertainty."""
 NEIGHBOURS = 5
 """Points, itself among them, whose median tells whether a point stands alone."""
 SMALL = 0.25
@@ -179,7 +181,7 @@ def verdicts(points: Float, value: Float, sigma: Float, lower: float, upper: flo
     NEIGHBOURS has to be beyond the limit as well, as no stray point is a place of the part.
     """
     found = np.full(len(value), UNDECIDED, dtype=np.int8)
-    found[(value - 2.0 * sigma >= lower) & (value + 2.0 * sigma <= upper)] = WITHIN
+    found[(value - COVERAGE * sigma >= lower) & (value + COVERAGE * sigma <= upper)] = WITHIN
     uncertainty = coverage_of_all(len(value)) * sigma
     below, above = value + uncertainty < lower, value - uncertainty > upper
     some = np.flatnonzero(below | above)
@@ -193,7 +195,7 @@ def verdicts(points: Float, value: Float, sigma: Float, lower: float, upper: flo
 
 def coverage_of_all(count: int) -> float:
     """Sigmas that the largest of `count` normal errors exceeds as rarely as a single one exceeds two."""
-    return float(-scipy.special.ndtri(scipy.special.ndtr(-2.0) / max(count, 1)))
+    return float(-scipy.special.ndtri(scipy.special.ndtr(-COVERAGE) / max(count, 1)))
 
 
 def verdict_of(judged: Verdicts) -> Verdict:

@@ -35,6 +35,7 @@ GENTLE = 0.3
 """Rise over the distance from the next point that such a cell may have, beside what noise makes of it."""
 THIN = 0.3
 """Of the usual height of a triangle: a thinner one, of points of one scan line, is no plane to continue."""
+HEIGHT, WALL, UNMEASURED, LEFT_OUT = range(4)
 CHUNK = 1 << 18
 """Cells at a time."""
 Means = tuple[NDArray[np.intp], Float, NDArray[np.intp]]
@@ -58,14 +59,40 @@ class HeightMap:
     """Median random sigma of a cell, as that of its points."""
     correlation: float
     """Median correlation of a cell's random error with that of its right neighbour."""
-    steep: int = 0
-    """Cells without a height as the surface there is a wall or a jump, or their points contradict each other."""
-    points_without: int = 0
-    """Points within cells without a height, and beyond the map."""
-    points_steep: int = 0
-    """Those of them that are within the steep cells."""
-    unmeasured: int = 0
-    """Cells without a height as nothing was measured there: over holes, and outside of the scanned area."""
+    why: NDArray[np.uint8] | None = None
+    """(rows, columns) HEIGHT, or why there is none: WALL, UNMEASURED or LEFT_OUT."""
+    count: NDArray[np.intp] | None = None
+    """(rows, columns) points within each cell."""
+    points_left_out: int = 0
+    """Those within cells whose heights were left out."""
+
+    @property
+    def steep(self) -> int:
+        """Cells without a height as the surface there is a wall or a jump, or their points contradict each other."""
+        return self._cells(WALL)
+
+    @property
+    def unmeasured(self) -> int:
+        """Cells without a height as nothing was measured there: over holes, and outside of the scanned area."""
+        return self._cells(UNMEASURED)
+
+    @property
+    def left_out(self) -> int:
+        """Cells on the map whose height was left out."""
+        return self._cells(LEFT_OUT)
+
+    @property
+    def points_without(self) -> int:
+        """Points within cells without a height, and beyond the map."""
+        return 0 if self.count is None else self.points - int(self.count[np.isfinite(self.heights)].sum())
+
+    @property
+    def points_steep(self) -> int:
+        """Those of them that are within the steep cells."""
+        return 0 if self.count is None or self.why is None else int(self.count[self.why == WALL].sum())
+
+    def _cells(self, why: int) -> int:
+        return 0 if self.why is None else int(np.count_nonzero(self.why == why))
 
 
 def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
@@ -122,7 +149,8 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
         wrong = contradicted(heights[cells], steep[here[2]], lowest[cells], highest[cells], pitch, usual)
         heights[cells[wrong]] = sigma[cells[wrong]] = np.nan
         is_steep[cells] = wrong
-    is_empty, inside = np.isnan(heights), own[own >= 0]
+    why = np.where(is_steep, WALL, np.where(np.isnan(heights), UNMEASURED, HEIGHT)).astype(np.uint8)
+    count = np.bincount(own[own >= 0], minlength=rows * columns)
     together = covariance[:-1] / (sigma[:-1] * sigma[1:])
     return HeightMap(
         heights.reshape(rows, columns),
@@ -133,10 +161,8 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
         usual,
         _median(sigma),
         _median(together),
-        int(np.count_nonzero(is_steep)),
-        int(np.count_nonzero(is_empty[inside])) + len(own) - len(inside),
-        int(np.count_nonzero(is_steep[inside])),
-        int(np.count_nonzero(is_empty & ~is_steep)),
+        why.reshape(rows, columns),
+        count.reshape(rows, columns),
     )
 
 
@@ -172,7 +198,12 @@ def within(made: HeightMap, limits: tuple[float, float] | None) -> HeightMap:
     shown = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
     heights = np.where(kept, made.heights, np.nan)[shown]
     x, y = made.x + columns[0] * made.pitch, made.y - rows[0] * made.pitch
-    return replace(made, heights=heights, x=float(x), y=float(y))
+    cut = replace(made, heights=heights, x=float(x), y=float(y))
+    if made.why is None or made.count is None:
+        return cut
+    gone = known & ~kept
+    why = np.where(gone, np.uint8(LEFT_OUT), made.why)[shown]
+    return replace(cut, why=why, count=made.count[shown], points_left_out=int(made.count[gone].sum()))
 
 
 def encoded(heights: Float) -> tuple[NDArray[np.uint16], float, float]:

@@ -85,7 +85,8 @@ def details(record: dict[str, Any]) -> list[str]:
             f"{counts[name]} {SIDES.get(name, name)}" for name in ("within", "undecided", "above", "below")
         )
         told.append(f"{percent(record['share_beyond'], 2)} of the points are out of the tolerance's band")
-        told.append(f"{MARKS[record['verdict']]} by ISO 14253-1 with two sigma: {shares}")
+        told.append(f"{MARKS[record['verdict']]} by ISO 14253-1, within by two sigma: {shares}")
+        told.append(_what_is_out(record, record["undecided_but_beyond"]))
     if record["median_sigma"] is not None:
         at_most = " at most" if record["sigma_is_bound"] else ""
         size = f"{micrometres(2.0 * record['median_sigma'])}{at_most}"
@@ -93,6 +94,17 @@ def details(record: dict[str, Any]) -> list[str]:
     if record["points_left_out"]:
         told.append(f"{record['points_left_out']} points are of other objects")
     return told
+
+
+def _what_is_out(record: dict[str, Any], alone: int) -> str:
+    """The rule for what is outside or inside, and how many points come to less than it."""
+    surely, points = record["coverage_beyond"], record["points"]
+    rule = f"Outside and inside are places, not points: beyond by {surely:.1f} sigma, which chance does as rarely to"
+    told = f"{rule} any of {points} points as two sigma to one, and the median around beyond as well"
+    if not alone:
+        return told
+    are = "is" if alone == 1 else "are"
+    return f"{told}; {alone} of the undecided {are} beyond by two sigma, but not by this"
 
 
 def _metres(micrometre: float | None) -> float | None:

@@ -17,6 +17,7 @@ from analysis.cloud import Cloud, at_first_step, merge, ply_pieces
 from analysis.deviation import (
     ABOVE,
     BELOW,
+    COVERAGE,
     UNDECIDED,
     WITHIN,
     Aligned,
@@ -24,6 +25,7 @@ from analysis.deviation import (
     Deviations,
     Verdicts,
     best_fit,
+    coverage_of_all,
     deviations,
     far_off,
     sigma_of_deviation,
@@ -81,6 +83,11 @@ class Question:
     lower: float | None = None
     upper: float | None = None
 
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Infinite where there is none."""
+        return -math.inf if self.lower is None else self.lower, math.inf if self.upper is None else self.upper
+
 
 @dataclass(frozen=True)
 class Compared:
@@ -106,6 +113,14 @@ class Compared:
     """Of some points the whole sigma is taken, as nobody knows their normal: at most that along it."""
 
     @property
+    def beyond(self) -> NDArray[np.bool_]:
+        """(m,) whether a point by itself is out of the tolerance by COVERAGE sigmas."""
+        lower, upper = self.question.limits
+        return np.asarray(
+            (self.found.value + COVERAGE * self.sigma < lower) | (self.found.value - COVERAGE * self.sigma > upper)
+        )
+
+    @property
     def record(self) -> dict[str, Any]:
         """What is told of it, SI units."""
         value, aligned = self.found.value, self.found.aligned
@@ -113,9 +128,10 @@ class Compared:
         robust = robust_sigma(value)
         far = far_off(value)
         shift, turn = turn_and_shift(aligned.motion, self.found.points)
-        counts = None
+        counts, alone = None, None
         if self.verdicts is not None:
             counts = {name: int(np.count_nonzero(self.verdicts == key)) for key, name in NAMES.items()}
+            alone = int(np.count_nonzero(self.beyond & (self.verdicts == UNDECIDED)))
         return {
             "format": FORMAT,
             "format_version": VERSION,
@@ -148,6 +164,9 @@ class Compared:
             "lower": self.question.lower,
             "upper": self.question.upper,
             "verdicts": counts,
+            "undecided_but_beyond": alone,
+            "coverage": COVERAGE,
+            "coverage_beyond": coverage_of_all(len(value)),
             "verdict": None if self.verdicts is None else verdict_of(self.verdicts),
         }
 
@@ -190,9 +209,7 @@ def compare_cloud(scene: Scene, root: Path, cloud: Cloud, question: Question) ->
     made = deviations(points, eyes, vertices, triangles, aligned)
     judged = None
     if question.lower is not None or question.upper is not None:
-        lower = -math.inf if question.lower is None else question.lower
-        upper = math.inf if question.upper is None else question.upper
-        judged = verdicts(made.points, made.value, sigma, lower, upper)
+        judged = verdicts(made.points, made.value, sigma, *question.limits)
     columns = {name: cloud[name][here] for name in ("laser", "step", "row")}
     towards = (eyes - points).mean(axis=0)
     others, is_bound = int(np.count_nonzero(~here)), not bool(known_normal[here].all())

@@ -186,10 +186,13 @@ def _written(
 
 
 def left_out_record(whole: HeightMap, kept: HeightMap) -> dict[str, Any]:
-    """How many cells with a height the kept map lacks, and from where to where heights are without and with them; m."""
+    """How many cells with a height the kept map lacks, in the picture and beside it, the points within them, and from
+    where to where heights are without and with them; m."""
     inside, there = (one.heights[np.isfinite(one.heights)] for one in (kept, whole))
     return {
         "cells": len(there) - len(inside),
+        "cells_in_picture": kept.left_out,
+        "points": kept.points_left_out,
         "kept_from": float(inside.min()),
         "kept_to": float(inside.max()),
         "all_from": float(there.min()),
@@ -216,7 +219,7 @@ def steep_record(made: HeightMap) -> dict[str, Any]:
         "cells": made.steep,
         "points": made.points_steep,
         "cells_not_measured": made.unmeasured,
-        "points_without_height": made.points_without,
+        "points_without_height": made.points_without - made.points_left_out,
     }
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 from analysis.cloud import Cloud
-from analysis.height_map import HeightMap, decoded, encoded, height_map, within
+from analysis.height_map import HEIGHT, UNMEASURED, HeightMap, decoded, encoded, height_map, within
 from render.base.errors import InputError
 
 ROWS, STEPS, SIGMA = 40, 12, 2e-5
@@ -139,14 +139,26 @@ def test_strays_that_are_left_out_leave_the_others_where_they_were_on_a_grid_of_
     heights[-whole.heights.shape[0] :, : whole.heights.shape[1]] = whole.heights
     top = whole.y + whole.heights.shape[0] * whole.pitch
     heights[:2, -2:] = -0.8
-    wide = replace(whole, heights=heights, y=top)
+    assert whole.why is not None and whole.count is not None
+    why, count = np.full(heights.shape, UNMEASURED, dtype=np.uint8), np.zeros(heights.shape, dtype=np.intp)
+    why[-whole.why.shape[0] :, : whole.why.shape[1]] = whole.why
+    count[-whole.why.shape[0] :, : whole.why.shape[1]] = whole.count
+    why[:2, -2:], count[0, -2:] = HEIGHT, 1
+    # and one between the others, which stays on the map
+    heights[-4, 4], at_4 = -0.8, int(count[-4, 4])
+    wide = replace(whole, heights=heights, y=top, why=why, count=count, points=whole.points + 2)
     kept = within(wide, (-0.1, 1.0))
     known = np.isfinite(whole.heights)
     rows, columns = (np.flatnonzero(known.any(axis=axis)) for axis in (1, 0))
     inner = whole.heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    inner[-4, 4] = np.nan
     np.testing.assert_array_equal(kept.heights, inner)
     assert kept.x == pytest.approx(whole.x + columns[0] * whole.pitch, abs=1e-12)
     assert kept.y == pytest.approx(whole.y - rows[0] * whole.pitch, abs=1e-12)
+    has = int(np.isfinite(kept.heights).sum())
+    assert has + kept.steep + kept.unmeasured + kept.left_out == kept.heights.size < wide.heights.size
+    assert kept.left_out == 1 and kept.points_left_out == 2 + at_4
+    assert kept.points_without == whole.points_without + 2 + at_4
     assert within(wide, None) is wide and within(wide, (-1.0, 1.0)) is wide
     with pytest.raises(InputError, match="no cell with a height"):
         within(wide, (5.0, 6.0))

@@ -60,9 +60,22 @@ def test_against_the_part_as_scanned_deviations_are_the_scan_s_own_distances(sca
     assert record == {"ok": True, "files": record["files"], **json.loads((scan / "deviation.json").read_text())}
     assert cv2.imread(str(scan / "deviation.png")) is not None
     assert record["meaning"].startswith("positive is outside the nominal part")
+    value, sigma = (column(scan / "deviation.csv", name) for name in ("deviation_m", "sigma_m"))
+    beyond = (np.abs(value) - 2.0 * sigma > 700e-6).sum()
+    proved = record["verdicts"]["above"] + record["verdicts"]["below"]
+    assert record["undecided_but_beyond"] == beyond - proved and sum(record["verdicts"].values()) == record["points"]
     said = call("deviation", scan, "--lower=-700", "--upper", 700).stdout  # replaces its own files
     assert "Sign of a deviation: positive is outside the nominal part" in said
     assert f"{record['verdicts']['above']} outside (above the upper limit)" in said
+
+
+def test_a_point_that_is_out_alone_is_said_to_be_undecided_and_by_what_rule(scan: Path) -> None:
+    """One whole interval was above the limit, and "0 outside" stood beside it under the name of two sigma."""
+    record = told("deviation", scan, "--lower=-700", "--upper", 700) | {"undecided_but_beyond": 1, "points": 8185}
+    said = " ".join(details(record | {"coverage_beyond": 4.6}))
+    assert "beyond by 4.6 sigma, which chance does as rarely to any of 8185 points as two sigma to one" in said
+    assert "; 1 of the undecided is beyond by two sigma, but not by this" in said
+    assert "but not by this" not in " ".join(details(record | {"undecided_but_beyond": 0}))
 
 
 def test_points_far_off_are_not_called_false(scan: Path) -> None:
