@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 NONE = "–"  # noqa: RUF001 - a dash in a table
+MOST_OF_ALL = 99.9
+"""%, in three digits."""
 
 
 def digits(value: float, significant: int = 3) -> str:
@@ -17,6 +19,11 @@ def digits(value: float, significant: int = 3) -> str:
     if not -5 < size < 6:
         return f"{value:.{significant - 1}e}"
     return f"{value:.{max(0, significant - 1 - size)}f}"
+
+
+def digits_of_percent(value: float) -> str:
+    """Three significant digits of a share in %; one that is not all of it is never rounded up to 100."""
+    return digits(min(value, MOST_OF_ALL) if value < 100.0 else value)
 
 
 def micrometres(value: float, significant: int = 3) -> str:
@@ -63,9 +70,11 @@ def seconds(value: float) -> str:
 
 
 def percent(value: float, decimals: int = 1) -> str:
-    """Fraction -> "98.2 %"; what is not all of it is never rounded up to 100."""
+    """Fraction -> "98.2 %"; what is not all of it is never rounded up to 100, nor some, of a million, to 0."""
     if not math.isfinite(value):
         return NONE
+    while 0.0 < 100.0 * value < 0.5 * 10.0**-decimals and decimals < 4:
+        decimals += 1
     shown = min(100.0 * value, 100.0 - 10.0**-decimals) if value < 1.0 else 100.0 * value
     return f"{shown:.{decimals}f}\u00a0%"
 

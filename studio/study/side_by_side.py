@@ -10,7 +10,7 @@ from pathlib import Path
 from analysis.gauges.read import Reading
 from analysis.report.colour import method_name
 from analysis.report.gauge_table import scale_and_unit, small_text, value_text
-from analysis.report.units import digits
+from analysis.report.units import digits, digits_of_percent
 from render.base.csv_file import write_csv
 from studio.editing.units import Unit
 from studio.project.project import Project
@@ -65,7 +65,7 @@ def side_by_side(renders: Sequence[Kept], now: Project | None = None) -> list[Ro
             continue
         apart = unit == PIXELS and not one_scale  # pixels of another size have no difference
         alike = [one.image_scale == first.image_scale or not apart for one in renders]
-        cells = [_cell(value, values[0] if k and alike[k] else math.nan) for k, value in enumerate(values)]
+        cells = [_cell(value, values[0] if k and alike[k] else math.nan, unit) for k, value in enumerate(values)]
         label = f"{LABELS.get(name, name)} / {unit}" + (" of its own image" if apart else "")
         rows.append(Row(label, tuple(cells), True, tuple(values)))
     rows += _measures(renders)
@@ -207,10 +207,11 @@ def _for_file(row: Row) -> list[str]:
     return [f"{value:.9g}" if math.isfinite(value) else "" for value in row.values] or list(row.cells)
 
 
-def _cell(value: float, first: float) -> str:
+def _cell(value: float, first: float, unit: str) -> str:
     if not math.isfinite(value):
         return NONE
+    told = digits_of_percent(value) if unit == "%" else digits(value)
     if not math.isfinite(first):
-        return digits(value)
+        return told
     change = value - first
-    return f"{digits(value)} ({'+' if change > 0.0 else ''}{digits(change, 2)})"
+    return f"{told} ({'+' if change > 0.0 else ''}{digits(change, 2)})"

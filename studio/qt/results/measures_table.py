@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
 from analysis.report.colour import method_name
-from analysis.report.units import digits
+from analysis.report.units import digits, digits_of_percent
 from studio.qt.core import theme
 from studio.scan.result_series import COVERED, UNCERTAINTY
 
@@ -35,14 +35,15 @@ EXPLAINED = {
 ROW_PX = 22
 MOST_UM = 1e4
 """From which on a row is in mm."""
-MOST_OF_ALL = 99.9
-"""%, in three digits."""
 
 
 def shown(value: float, unit: str = "") -> str:
     """Three digits, or all of a whole number; a share that is not all of it is never rounded up to 100 %."""
-    value = min(value, MOST_OF_ALL) if unit == "%" and value < 100.0 else value
-    return "-" if math.isnan(value) else f"{value:.0f}" if value == round(value) else digits(value)
+    if math.isnan(value):
+        return "-"
+    if value == round(value):
+        return f"{value:.0f}"
+    return digits_of_percent(value) if unit == "%" else digits(value)
 
 
 def readable(name: str, unit: str, values: list[float]) -> tuple[str, str, list[float]]:
