@@ -44,10 +44,11 @@ def set_apart(
 ) -> tuple[str, ...]:
     """Each field by which a study is another than that of a folder: "Bit depth: 12 in the folder, 10 now"."""
     told = []
-    for field, label in (("image_scale", "Image scale"), ("laser", "Laser")):
-        there, now = getattr(begun, field), getattr(study, field)
-        if there != now:
-            told.append(f"{label}: {there:g} in the folder, {now:g} now")
+    if begun.image_scale != study.image_scale:
+        told.append(f"Image scale: {begun.image_scale:g} in the folder, {study.image_scale:g} now")
+    if begun.laser != study.laser:
+        measured, asked = _laser_of(begun, begun_with), _laser_of(study, bases)
+        told.append(f"Laser: {measured} in the folder, {asked} now")
     for name in dict.fromkeys((*begun.set, *study.set)):
         there, now = begun.set.get(name, "not fixed"), study.set.get(name, "not fixed")
         if there != now:
@@ -61,6 +62,13 @@ def set_apart(
         read = base if _asked(study, base) != _asked(study, before) else base.read_as(before)
         told += [_told(one) for one in changes(before, read)]
     return tuple(dict.fromkeys(told))
+
+
+def _laser_of(study: Study, bases: Mapping[str, Project]) -> str:
+    """By its name; by its number where no base is known that has it."""
+    base = bases.get(study.base)
+    lasers = () if base is None else base.scene.lasers
+    return lasers[study.laser].name if study.laser < len(lasers) else str(study.laser)
 
 
 def told_apart(apart: tuple[str, ...]) -> str:

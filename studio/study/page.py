@@ -25,7 +25,7 @@ from studio.study.references import HEADER as BESIDE_HEADER
 from studio.study.references import Beside, beside, write_references
 from studio.study.references import page_rows as page_rows_beside
 from studio.study.store import Row
-from studio.study.study import Study, Sweep
+from studio.study.study import Study, Sweep, told_laser
 
 DPI = 160
 """Of a chart, in its file and in the page."""
@@ -70,18 +70,12 @@ def write_page(
         "parts": parts,
         "cells": len(rows),
         "repeats": study.repeats,
-        "bases": ", ".join(sorted(bases)) + _of_laser(study, bases),
+        "bases": " · ".join([", ".join(sorted(bases)), *told_laser(study, bases)]),
     }
     page = page_of(Path(__file__).parent / "page.html", content)
     with atomic_write(folder / "study.html") as temporary:
         temporary.write_text(page, encoding="utf-8")
     return folder / "study.html", found
-
-
-def _of_laser(study: Study, bases: Mapping[str, Project]) -> str:
-    """Of several lasers the one that is measured."""
-    lasers = bases[study.base].scene.lasers
-    return f" · of {lasers[study.laser].name}, one of {len(lasers)} lasers" if len(lasers) > 1 else ""
 
 
 def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:

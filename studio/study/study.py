@@ -6,6 +6,7 @@ import difflib
 import hashlib
 import json
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -274,6 +275,12 @@ def require_laser(project: Project, laser: int, where: str) -> int:
         allowed = f"0 to {count - 1}" if count > 1 else "0" if count else "none: the rig has no laser"
         raise InputError("there is no such laser in the project", where=where, found=laser, allowed=allowed)
     return laser
+
+
+def told_laser(study: Study, bases: Mapping[str, Project], base: str | None = None) -> list[str]:
+    """Of several lasers of a base, None: the study's own, the one that is measured, in words; of a single one none."""
+    lasers = bases[base or study.base].scene.lasers
+    return [f"of {lasers[study.laser].name}, one of {len(lasers)} lasers"] if len(lasers) > 1 else []
 
 
 def with_fields(project: Project, values: dict[str, Value], where: str) -> Project:

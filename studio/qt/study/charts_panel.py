@@ -23,6 +23,7 @@ from studio.qt.study.cell_opener import CellOpener
 from studio.qt.study.chart_view import ChartView
 from studio.qt.study.study_work import StudyWork
 from studio.study.answers import Answer
+from studio.study.study import told_laser
 
 NOTHING = (
     "Nothing is measured yet. Choose a field to vary and run the study: charts fill while it runs, "
@@ -103,8 +104,11 @@ class ChartsPanel(QWidget):
         from studio.study.page import columns, sentences, table
 
         answer, labels = as_read(answer, found.bases.values())
-        self.question.setText(answer.sweep.question)
-        self.question.setVisible(bool(answer.sweep.question))
+        asked = [
+            one for one in (answer.sweep.question, *told_laser(found.study, found.bases, answer.sweep.base)) if one
+        ]
+        self.question.setText(" · ".join(asked))
+        self.question.setVisible(bool(asked))
         said = sentences(answer, labels)
         self.findings.setText("\n".join(said))
         self.findings.setVisible(bool(said))
@@ -143,7 +147,6 @@ class ChartsPanel(QWidget):
                     item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
                 widget.setItem(i, k, item)
         widget.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        widget.horizontalHeader().setStretchLastSection(True)
         widget.blockSignals(False)
 
     def _hover(self, spot: int | None) -> None:

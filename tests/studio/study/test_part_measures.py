@@ -19,7 +19,7 @@ from studio.study.cells import next_cells
 from studio.study.measures import measure_of, part_names
 from studio.study.measuring import measure_task
 from studio.study.store import Store
-from studio.study.study import Study
+from studio.study.study import Study, told_laser
 from studio.study.tables import write_tables
 from studio.study.tasks import tasks
 
@@ -139,6 +139,18 @@ def test_a_calibration_that_was_taken_over_since_is_told_without_its_numbers() -
     assert told_apart(first).count("there is one now") == 2 and "0.97" not in told_apart(first)
     (second,) = set_apart(study, calibrated(-0.2), study, calibrated(-0.1))
     assert second.endswith("Laser planes: another one in the folder")
+
+
+def test_another_laser_is_told_by_its_name() -> None:
+    """In the folder and now were 0 and 1, and the window chooses them by their names."""
+    study, bases = study_of("depth_rmse")
+    base = bases["step_block"]
+    (laser,) = base.scene.lasers
+    rig = {"scene.rig.lasers": [laser.model_dump(mode="json"), {**laser.model_dump(mode="json"), "name": "second"}]}
+    two = {"step_block": base.replaced(rig).in_folder(base.folder)}
+    other = study.model_copy(update={"laser": 1})
+    assert set_apart(other, two, study, two) == (f"Laser: {laser.name} in the folder, second now",)
+    assert told_laser(other, two) == ["of second, one of 2 lasers"] and told_laser(study, bases) == []
 
 
 def test_digests_of_meshes_that_saving_writes_lock_nothing_out(tmp_path: Path) -> None:

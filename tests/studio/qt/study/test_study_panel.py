@@ -88,6 +88,21 @@ class TestDraft:
         desk.panel.laser.activated.emit(0)
         assert desk.work.study().laser == 0 and desk.panel.laser.isHidden()
 
+    def test_a_chart_says_which_of_several_lasers_it_is_of_whatever_is_chosen_now(
+        self, qtbot: QtBot, desk: Desk, tmp_path: Path
+    ) -> None:
+        desk.small([2.0, 4.0])
+        desk.work.choose_folder(tmp_path / "results")
+        (first,) = desk.session.project.scene.lasers
+        desk.session.set(LASERS, (first, first.model_copy(update={"name": "second"})))
+        run(qtbot, desk)
+        told = f"of {first.name}, one of 2 lasers"
+        qtbot.waitUntil(lambda: told in desk.charts.question.text())
+        desk.panel.laser.activated.emit(1)
+        now = f"Laser: {first.name} in the folder, second now"
+        qtbot.waitUntil(lambda: now in desk.panel.problem.text())
+        assert told in desk.charts.question.text() and not desk.charts.question.isHidden()
+
     def test_a_study_that_nobody_has_begun_is_no_fault(self, desk: Desk) -> None:
         desk.work.look_ahead()
         assert not desk.panel.problem.text() and "varies a field" in desk.panel.told.text()
