@@ -19,6 +19,7 @@ from studio.qt.core.session import Render
 from studio.qt.image.image_item import PictureItem, PictureView
 from studio.runtime.jobs import Progress
 from studio.scan.compare import Comparison, Quantity, compare, quantities
+from studio.scan.redevelop import Development
 
 LABELS: dict[Quantity, str] = {
     "image": "Image",
@@ -167,19 +168,15 @@ class CompareView(QWidget):
             self._show_scale(unit)
 
     def _exposed(self) -> str:
-        """How long the images were: renders are developed with the exposure of now as they are looked at."""
+        """How the images were made: renders are developed with the exposure and powers of now as they are looked at."""
         if self._pair is None or self.quantity.currentData() != "image":
             return ""
         made = [(one, one.made_from.get("images")) for one in (self._pair[0], self._pair[2])]
-        times = [
-            Unit.of("s").with_unit(float(f"{how[1].project.sensor.exposure_time / one.image_scale**2:.4g}"))
-            for one, how in made
-            if how is not None
-        ]
-        if len(times) < 2:
+        told = [_developed_with(how[1], one.image_scale) for one, how in made if how is not None]
+        if len(told) < 2:
             return ""
-        left, right = times
-        return f"; both exposed for {left}" if left == right else f"; exposed for {left} left and {right} right"
+        left, right = told
+        return f"; both developed with {left}" if left == right else f"; developed with {left} left, {right} right"
 
     def _show_scale(self, unit: str) -> None:
         table = np.ascontiguousarray(np.broadcast_to(colour_table(DIVERGING, 160), (12, 160)))
@@ -198,3 +195,17 @@ class CompareView(QWidget):
         if 0 <= row < a.shape[0] and 0 <= column < a.shape[1]:
             left, right = float(a[row, column]), float(b[row, column])
             self.told.setText(f"u, v {column}, {row}: {left:.4g}, {right:.4g}, difference {right - left:+.4g} {unit}")
+
+
+def _developed_with(how: Development, image_scale: float) -> str:
+    """The exposure, and the power of each laser, whatever it was when the light was rendered."""
+    exposure = Unit.of("s").with_unit(float(f"{how.project.sensor.exposure_time / image_scale**2:.4g}"))
+    lasers = how.project.scene.lasers
+    powers = [Unit.of("W").with_unit(power) for power in how.laser_power]
+    several = len(lasers) > 1
+    return ", ".join(
+        [
+            exposure,
+            *(f"{laser.name} {power}" if several else power for laser, power in zip(lasers, powers, strict=True)),
+        ]
+    )

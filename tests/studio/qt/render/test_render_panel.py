@@ -262,13 +262,15 @@ def test_two_renders_are_compared_by_wipe_and_difference(qtbot, panel):
     a, b = window.comparison.a, window.comparison.b
     assert np.allclose(b, a / 2, rtol=1e-5)
     assert window.over.isVisible()
-    assert "exposed" not in window.told.text()  # light is of no exposure
+    assert "developed" not in window.told.text()  # light is of no exposure
     how = development(session.renders[0].project, session.renders[0].project)
     for render in session.renders:
         render.made_from["images"] = render.frame, how
     window.quantity.setCurrentIndex(0)
     window.quantity.activated.emit(0)
-    qtbot.waitUntil(lambda: "both exposed for" in window.told.text())
+    qtbot.waitUntil(lambda: "both developed with" in window.told.text())
+    watts = session.renders[0].project.scene.lasers[0].power
+    assert f" ms, {1e3 * watts:g} mW" in window.told.text()  # of now, whatever it was when the light was rendered
     window.mode.setCurrentText(DIFFERENCE)
     assert not window.over.isVisible() and "RMS" in window.told.text()
     window.close()
