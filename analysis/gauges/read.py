@@ -36,6 +36,10 @@ MISFITS = {
     "peak": "points miss its parabola by {:.0f} times their sigma: value and truth may be off the top; of a flat one "
     "take a step height, else a narrower region"
 }
+MANY = 0.1
+"""Of a region's points, from which on it is told that its curve leaves so many out."""
+LEFT_OUT = "{} of the {} points miss the curve in the region {!r} by far and are left out: it may reach over an edge"
+SWAPPED = "the region {!r} lies on the right of {!r}: drag the two anew, or give their ends anew"
 STRAY = "the exact line does not reach its regions: the value is of stray light or noise"
 NO_TRUTH = "; the exact line does not reach there either, so that the area has no truth"
 STRAIGHTEST = 10.0
@@ -113,8 +117,29 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
         remark = STRAY
     if not remark and ratio > MISFIT:
         remark = MISFITS.get(gauge.kind, OTHER_SHAPE).format(ratio)
+    remark = remark or _swapped(gauge) or _left_out(gauge, measured, fits)
     one = Reading(gauge, step, value, ratio * random, systematic, int(used), true, "", remark)
     return replace(_beside_square(one, measured), section=measured.section.name)
+
+
+def _swapped(gauge: Gauge) -> str:
+    """In words, that what is called left lies on the right; empty: it does not."""
+    left, right = REGIONS[gauge.kind][-2:] if len(gauge.regions) > 1 else ("", "")
+    swapped = left.startswith("left") and sum(gauge.regions[-2]) > sum(gauge.regions[-1])
+    return SWAPPED.format(left, right) if swapped else ""
+
+
+def _left_out(gauge: Gauge, profile: Profile, fits: Sequence[Fit]) -> str:
+    """In words, of which region many points are not in the curve; empty: of none."""
+    told, most = "", MANY
+    for k, (name, region) in enumerate(zip(REGIONS[gauge.kind], gauge.regions, strict=True)):
+        if gauge.kind != "step" and k >= len(fits):
+            continue  # of the second region of an area no curve is fitted
+        there = profile.weight(*region) > 0.0
+        of_all, missing = np.count_nonzero(there), np.count_nonzero(there & ~fits[min(k, len(fits) - 1)].here)
+        if missing > most * of_all:
+            told, most = LEFT_OUT.format(missing, of_all, name), missing / of_all
+    return told
 
 
 def _beside_square(one: Reading, profile: Profile) -> Reading:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analysis.gauges.gauge import REGIONS, TITLES, Gauge, Kind
 from analysis.report.units import NONE, digits
+
+if TYPE_CHECKING:
+    from analysis.gauges.read import Reading
 
 COLUMNS = ("kind", "value", "sigma", "nominal", "tolerance", "verdict", "error", "error / sigma")
 MARKS = {"pass": "✓\u00a0pass", "fail": "✗\u00a0fail", "undecided": "?\u00a0undecided"}
@@ -125,6 +128,13 @@ def worst_of(row: Mapping[str, Any]) -> str:
 def marked_verdict(row: Mapping[str, Any]) -> str:
     """Of such an entry that has a value, with what is amiss with it."""
     return verdict_text(row["verdict"], row.get("oblique"), MISSES in (row.get("remark") or ""))
+
+
+def label_of(one: Reading) -> str:
+    """Of a reading that has a value, for where it is drawn: its name, value and verdict, with what is amiss with it."""
+    told = verdict_text(one.verdict, one.oblique, MISSES in one.remark)
+    value = f"{one.gauge.name}: {value_text(one.value, one.sigma, one.gauge.unit)}"
+    return value if told == NONE else f"{value}, {told}"
 
 
 def verdict_text(verdict: str | None, oblique: float | None = None, misfit: bool = False) -> str:

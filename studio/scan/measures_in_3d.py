@@ -10,7 +10,7 @@ from analysis.cloud import at_first_step
 from analysis.gauges.outline import outline
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import value_text, verdict_text
+from analysis.report.gauge_table import label_of
 from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.scene.scene import Scene
@@ -47,10 +47,8 @@ def measures_in_3d(
         placed = [
             at_first_step(transform_points(T_world_section, _in_section(line, profile)), scene, step) for line in lines
         ]
-        verdict = f", {verdict_text(one.verdict)}" if one.verdict else ""
-        text = f"{one.gauge.name}: {value_text(one.value, one.sigma, one.gauge.unit)}{verdict}"
         at = placed[-1].mean(axis=0) if len(dimension) else placed[0][-1]
-        found.append(MeasureIn3D(text, one.verdict, tuple(placed), at))
+        found.append(MeasureIn3D(label_of(one), one.verdict, tuple(placed), at))
     return found
 
 

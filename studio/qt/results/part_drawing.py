@@ -14,7 +14,7 @@ from analysis.gauges.gauge import REGIONS, Gauge, Kind
 from analysis.gauges.outline import outline
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import value_text
+from analysis.report.gauge_table import label_of
 from render.base.arrays import Float
 from studio.qt.core import theme
 from studio.qt.results import plots
@@ -56,7 +56,7 @@ class PartDrawing(QObject):
                 self._line(dimension, pg.mkPen(colour, width=1.6, style=Qt.PenStyle.DashLine))
             if is_chosen and (curves or len(dimension)):
                 at = dimension.mean(axis=0) if len(dimension) else curves[0][-1]
-                self._text(f"{one.gauge.name}: {value_text(one.value, one.sigma, one.gauge.unit)}", at, colour)
+                self._text(label_of(one), at, colour)
 
     def show_regions(self, kind: Kind | None, regions: Sequence[tuple[float, float]] = ()) -> None:
         """Of one measure, as many as there are yet; once all are there they move, unless `locked`. None: of none."""
