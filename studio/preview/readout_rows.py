@@ -183,7 +183,8 @@ def _peak(r: Readouts) -> Row:
     help += (
         f" Ambient light and dark current give {r.ambient_electrons:,.0f} e- of it, "
         f"the laser {r.laser_electrons:,.0f} e-: to the detection {r.detected:.1f} times the least that counts as a "
-        f"line. Below 1 it is lost in the noise, below {MEASURED:g} it is often detected and not measured."
+        f"line. Below 1 it is lost in the noise, below {MEASURED:g} it is often detected and not measured. "
+        "Each is the median along the line, so that two need not add up to the third."
     )
     faint = r.detected < MEASURED or r.laser_electrons < DIM_ELECTRONS
     level: Level = "error" if r.detected < 1.0 else "warning" if faint else ""

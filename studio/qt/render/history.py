@@ -146,7 +146,7 @@ class History(QWidget):
         )
         DeleteKey(self.list, self.delete)
         heading = QLabel("Renders")
-        heading.setStyleSheet("font-weight: 600")
+        heading.setStyleSheet("QLabel { font-weight: 600 }")
         self.compare_button = QPushButton("Compare")
         self.compare_button.setToolTip("Side by side under a line that can be dragged, or their difference")
         self.delete_button = QPushButton("Delete")

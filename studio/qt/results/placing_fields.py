@@ -57,7 +57,7 @@ class PlacingField(NumberField):
         """In the colour of what is out of range."""
         colours = theme.colours()
         colour = {"": colours.text, "warning": colours.warning, "error": colours.error}[level]
-        style = f"color: {colour}; font-weight: 600"
+        style = f"QLineEdit {{ color: {colour}; font-weight: 600 }}"  # and not its tip
         if self.styleSheet() != style:
             self.setStyleSheet(style)
 

@@ -145,16 +145,16 @@ class ReadoutPanel(QWidget):
             note.setVisible(bool(row.note))
             told = f"<p>{row.label}: {row.help}</p>" + (f"<p>{row.note}</p>" if row.note else "")
             for label, style in (
-                (name, f"color: {colours.muted}"),
-                (value, f"color: {tints[row.level]}; font-weight: 600"),
-                (note, f"color: {colours.muted}"),
+                (name, f"QLabel {{ color: {colours.muted} }}"),
+                (value, f"QLabel {{ color: {tints[row.level]}; font-weight: 600 }}"),
+                (note, f"QLabel {{ color: {colours.muted} }}"),
             ):
                 if not isinstance(label, QLabel):
                     label.explain(told)
                     label.mark(row.level)
                     continue
                 label.setToolTip(told)
-                # a style sheet costs more to set than all the numbers to compute
+                # of a label alone, and not of its tip; a style sheet costs more to set than all the numbers to compute
                 if label.styleSheet() != style:
                     label.setStyleSheet(style)
         self._fit_notes()

@@ -101,7 +101,7 @@ class ParameterRow(QWidget):
         name = parameter.get("label") or (spec.label if spec is not None else parameter["field"])
         owner = owner_name(project, tuple(parts_of(parameter["field"])))
         self.title.setText(f"{name}   <span style='font-weight: 400'>{owner}</span>" if owner else name)
-        self.title.setStyleSheet("font-weight: 600")
+        self.title.setStyleSheet("QLabel { font-weight: 600 }")
         self.title.setToolTip(parameter["field"])
         remove = icon_button("cancel", f"No longer vary {name}", self.removed.emit)
         self.remove = remove
