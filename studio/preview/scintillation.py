@@ -65,7 +65,9 @@ def speckle_px(
     covariance, fineness = relative_covariance(camera, wavelength_nm, depolarised)
     across, left, right, light = line_light(sigma, position, amplitude)
     slope = amplitude[:, None] * (np.exp(-0.5 * left**2) - np.exp(-0.5 * right**2))
-    weight = slope / (light + background[:, None] + variance)
+    noise = light + background[:, None] + variance
+    # far from a line without background or read noise there is neither light nor noise, and nothing is to be weighed
+    weight = np.divide(slope, noise, out=np.zeros_like(slope), where=noise > 0.0)
     moved = weight * light / np.sum(weight * slope, axis=1)[:, None]
     steep = np.maximum(np.abs(across) / (2.0 * sigma[:, None] ** 2), 1e-6)
     uneven = 1.0 + fineness * (steep / np.tanh(steep) - 1.0)

@@ -70,3 +70,10 @@ def test_covariance_is_that_of_the_pattern_and_of_uneven_pixels() -> None:
         found = np.mean(flat[: 600 - k, : 600 - d] * flat[k:, d:])
         assert table[k, d] == pytest.approx(found, abs=4 * table[0, 0] / 600)
     assert table[0, 0] == pytest.approx(np.mean(flat**2) + 1e-4, rel=0.02)
+
+
+def test_beside_a_wide_line_a_narrow_one_without_any_noise_has_its_own_value() -> None:
+    """Pixels without light and without noise were 0 / 0, and so was the narrow line."""
+    both = speckle_px(camera(1.4), NM, np.array([0.3, 12.0]), np.zeros(2), np.full(2, 1e4), np.zeros(2), 0.0)
+    alone = speckle_px(camera(1.4), NM, np.full(1, 0.3), NONE, np.full(1, 1e4), NONE, 0.0)
+    assert both[0] == pytest.approx(alone[0], rel=1e-9) and np.isfinite(both).all()
