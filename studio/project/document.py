@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -40,6 +41,7 @@ class Document:
         self.path = path
         self.root = root if root is not None else path.parent if path is not None else Path.cwd()
         self._saved: Project | None = project if path is not None else None
+        self._on_disk = _digest(path)
         self._undo: list[Edit] = []
         self._redo: list[Edit] = []
         self.listeners: list[Callable[[], None]] = []
@@ -53,6 +55,12 @@ class Document:
     def saved(self) -> Project | None:
         """As the file at `path` holds it; None: it was never saved."""
         return self._saved
+
+    @property
+    def changed_on_disk(self) -> bool:
+        """Somebody else has written the file since it was read or written here: saving would lose what they did."""
+        now = _digest(self.path)
+        return now is not None and now != self._on_disk
 
     @property
     def undo_label(self) -> str | None:
@@ -111,11 +119,20 @@ class Document:
             old = self.project.name
             self._undo, self._redo = (_renamed(edits, old, name) for edits in (self._undo, self._redo))
         self.path, self.root, self.project, self._saved = target, target.parent, project, project
+        self._on_disk = _digest(target)
         self._tell()
 
     def _tell(self) -> None:
         for listener in list(self.listeners):
             listener()
+
+
+def _digest(path: Path | None) -> bytes | None:
+    """Of a file's bytes; None: there is none, or it cannot be read."""
+    try:
+        return None if path is None else hashlib.sha256(path.read_bytes()).digest()
+    except OSError:
+        return None
 
 
 def _renamed(edits: list[Edit], old: str, name: str) -> list[Edit]:

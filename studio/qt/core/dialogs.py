@@ -58,6 +58,23 @@ def ask_unsaved(parent: QWidget, name: str, more: str = "") -> Answer:
     return {button.Save: "save", button.Discard: "discard"}.get(button(chosen), "cancel")  # type: ignore[return-value]
 
 
+def ask_changed_on_disk(parent: QWidget, path: Path) -> Literal["over", "elsewhere", "cancel"]:
+    """What to do with a file that another window or program has written since it was opened or saved here."""
+    title, question = "Changed on disk", f"Save over “{path.name}”, which was changed since?"
+    box = QMessageBox(QMessageBox.Icon.Warning, title, question, parent=parent)
+    box.setObjectName("changed-on-disk")
+    box.setInformativeText(
+        "Another window or program has written the file since it was opened or saved here. Saving over it loses what "
+        f"was changed there; Save as… keeps both.\n\n{path}"
+    )
+    over = box.addButton("Save over it", QMessageBox.ButtonRole.DestructiveRole)
+    elsewhere = box.addButton("Save as…", QMessageBox.ButtonRole.AcceptRole)
+    box.setEscapeButton(box.addButton("Cancel", QMessageBox.ButtonRole.RejectRole))
+    box.setDefaultButton(elsewhere)
+    box.exec()
+    return "over" if box.clickedButton() is over else "elsewhere" if box.clickedButton() is elsewhere else "cancel"
+
+
 def ask_under_way(parent: QWidget, what: str) -> bool:
     """Whether to go although a render is under way; what: a sentence about it."""
     return _ask_to_go(parent, "under-way", "Under way", "Stop the render?", "Stop it", what)

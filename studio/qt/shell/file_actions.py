@@ -18,6 +18,7 @@ from studio.project.project_files import carry, missing_files
 from studio.project.templates import template_folder
 from studio.qt.core.dialogs import (
     TemplateDialog,
+    ask_changed_on_disk,
     ask_loss,
     ask_recovery,
     ask_under_way,
@@ -201,7 +202,10 @@ class FileActions(QObject):
 
     def save(self) -> bool:
         path = self.session.document.path
-        return self._save(path) if path is not None else self.save_as()
+        if path is None:
+            return self.save_as()
+        answer = ask_changed_on_disk(self.window, path) if self.session.document.changed_on_disk else "over"
+        return answer != "cancel" and (self.save_as() if answer == "elsewhere" else self._save(path))
 
     def save_as(self) -> bool:
         name = f"{self.session.project.name.replace('/', '-')}.json"

@@ -188,6 +188,18 @@ class TestSaving:
         assert document.path is not None
         assert Project.load(document.path) == document.project
 
+    def test_what_others_write_into_its_file_is_noticed(self, document: Document, tmp_path: Path) -> None:
+        document.save(tmp_path / "project.json")
+        other = Document(Project.load(tmp_path / "project.json"), tmp_path / "project.json")
+        assert not document.changed_on_disk and not other.changed_on_disk
+        other.set(("seed",), 7)
+        other.save()
+        assert document.changed_on_disk and not other.changed_on_disk
+        document.save()
+        assert not document.changed_on_disk and other.changed_on_disk
+        (tmp_path / "project.json").unlink()
+        assert not document.changed_on_disk, "saving loses nothing of what is not there"
+
     def test_a_failing_save_leaves_file_and_document_unharmed(self, document: Document, tmp_path: Path) -> None:
         assert document.path is not None
         text = document.path.read_text(encoding="utf-8")

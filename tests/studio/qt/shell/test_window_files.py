@@ -99,6 +99,20 @@ class TestFiles:
         assert window.files.may_close()
         assert Project.load(small_project).scene.lasers[0].power == 0.005
 
+    def test_a_file_that_another_window_has_written_is_not_saved_over_unasked(
+        self, window: MainWindow, qtbot: QtBot, small_project: Path
+    ) -> None:
+        window.files.open(small_project)
+        other = Document(Project.load(small_project), small_project)
+        other.set(("seed",), 7)
+        other.save()
+        window.session.set(("name",), "mine")
+        answer(qtbot, "changed-on-disk", "Cancel")
+        assert not window.files.save() and Project.load(small_project).seed == 7 and window.session.document.dirty
+        answer(qtbot, "changed-on-disk", "Save over it")
+        assert window.files.save() and Project.load(small_project).name == "mine"
+        assert window.files.save(), "nothing is asked of what was written here"
+
     def test_an_untouched_project_closes_without_a_question(self, own_window: MainWindow) -> None:
         assert own_window.close()
 
