@@ -13,6 +13,8 @@ ENOUGH = 30
 """Least number of points from which a conclusion is drawn."""
 SHEET_PX = 0.01
 """Bias by the sheet's width, px, above which it is mentioned: the uncertainty of a good line."""
+SURELY = 6.0
+"""Sigmas that most points are off together from which on their calibration is told to be of another set-up."""
 TOLD_OF_NOISE = 0.3
 """Of the robust sigma, from which on the calibration's error is told."""
 DOMINATED = 3.0
@@ -118,7 +120,8 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
     dominated = found.depth_z.rmse > DOMINATED * usual
     if found.u.outlier_rate > 0.002:
         said.append(
-            f"{percent(found.u.outlier_rate)} of the points are outliers, {WRONG}: a wrong peak, or an edge. "
+            f"{percent(found.u.outlier_rate)} of the points are outliers in the image, {WRONG}: a wrong peak, "
+            "or an edge. "
             f"{'They dominate the RMSE; t' if dominated else 'T'}he robust sigma leaves them out."
         )
     elif found.outliers and dominated:
@@ -129,7 +132,15 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
             f"{micrometres(found.depth_z.rmse)} is mostly of {them}; the robust sigma, which leaves {them} out, is "
             f"{micrometres(found.depth_z.robust_sigma)}."
         )
-    if found.calibration > TOLD_OF_NOISE * found.depth_z.robust_sigma:
+    off, allowed = abs(found.depth_z.median), SURELY * np.hypot(found.calibration, found.depth_z.robust_sigma)
+    if found.calibration > 0.0 and off > allowed:
+        said.append(
+            f"Points were made with a calibration that does not hold here: half of them are off by "
+            f"{micrometres(off)} in depth or more, {off / found.calibration:,.0f} times what it tells of itself "
+            f"({micrometres(found.calibration)}, one sigma). It was made before the camera, its lens or the laser was "
+            "changed, or of another scanner: calibrate again, or take it out of the project."
+        )
+    elif found.calibration > TOLD_OF_NOISE * found.depth_z.robust_sigma:
         said.append(
             f"Points were made with a calibration, whose own error is common to all of them: "
             f"{micrometres(found.calibration)} in depth as it is told (one sigma, median). The mean error of "

@@ -25,6 +25,10 @@ MEASURED = 3.0
 """Times the detection's threshold from which a line on ambient light is measured nearly as often as it is detected: of
 v_groove at 0.3 mW, at twice the threshold, a fit refused six in seven of the scan lines."""
 
+OF_ANOTHER_SET_UP = (
+    "That is more than it can be by chance: it was made before the camera, its lens or the laser was changed. "
+    "Calibrate again, or take it out of the project: Calibrate, Remove it from the project."
+)
 NOT_REFLECTED = "Light that is reflected between surfaces, which a render shows, is not counted."
 
 
@@ -103,6 +107,7 @@ def rows(r: Readouts) -> tuple[Row, ...]:
         _saturation(r),
         _focus(r),
         _sigma(r),
+        *_calibration(r),
         Row(
             "occluded",
             "Occluded",
@@ -248,6 +253,21 @@ def _sigma(r: Readouts) -> Row:
     help += f" Here: {photon} µm from photons, {speckle} µm from speckle."
     note = f"speckle {speckle}" if r.speckle_sigma > r.photon_sigma else f"photons {photon}"
     return Row("sigma", "Depth noise, sigma", f"{micrometres(r.speckled_sigma)} µm", _both(supposed, note), level, help)
+
+
+def _calibration(r: Readouts) -> list[Row]:
+    """Nothing where the project has none."""
+    if r.calibration is None:
+        return []
+    off, told = micrometres(r.calibration.off), micrometres(r.calibration.told)
+    help = (
+        f"The project's calibration puts the lit line {off} µm off in depth, rms over the line, by the scene's own "
+        f"camera and laser; it tells {told} µm of itself (one sigma)."
+    )
+    if not r.calibration.is_of_another(r.depth_sigma or 0.0):
+        return [Row("calibration", "Calibration", f"{off} µm off", f"{told} told", "", help)]
+    help += f" {OF_ANOTHER_SET_UP}"
+    return [Row("calibration", "Calibration", f"{off} µm off", "of another set-up", "error", help)]
 
 
 def _supposed(r: Readouts) -> tuple[str, Level]:

@@ -13,6 +13,7 @@ from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float
 from render.camera.camera import Camera
 from studio.preview import estimates
+from studio.preview.calibration_fit import CalibrationFit, calibration_fit
 from studio.preview.inspection import working_range
 from studio.preview.preview import Look
 from studio.preview.saturation import brightest, full_electrons, saturated_lines
@@ -94,6 +95,8 @@ class Readouts:
     """The same from fully developed speckle, whether or not the sensor shows it."""
     speckled: bool = False
     """The sensor shows speckle."""
+    calibration: CalibrationFit | None = None
+    """None: the project has none, or nothing of the line is in its reach."""
 
     @property
     def speckled_sigma(self) -> float | None:
@@ -168,6 +171,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         photon_sigma=_median(bound * depth),
         speckle_sigma=_median(speckle * depth[some]),
         speckled=sensor.speckle != "off",
+        calibration=calibration_fit(look.project, laser, curve.index, curve.position),
     )
 
 

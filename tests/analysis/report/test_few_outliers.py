@@ -69,3 +69,13 @@ def test_false_rows_are_said_to_be_at_an_end_only_where_they_are() -> None:
     ):
         said = " ".join(remarks(dataclasses.replace(found, false_rows=5, false_rows_at_ends=at_ends)))
         assert told in said and said.count("end of the line") == (at_ends > 0)
+
+
+def test_a_calibration_of_another_set_up_is_no_part_of_the_mean_error() -> None:
+    """Points 45 mm off were put down to a calibration that tells 80 um."""
+    scene, frames = make_frames(steps=STEPS)
+    found = total(report_of(scene, frames).record.chosen())
+    off = dataclasses.replace(found.depth_z, median=45e-3, bias=45e-3)
+    said = " ".join(remarks(dataclasses.replace(found, depth_z=off, calibration=80e-6))).replace("\u00a0", " ")
+    assert "a calibration that does not hold here" in said and "562 times what it tells of itself (80.0 µm" in said
+    assert "common to all of them" not in said
