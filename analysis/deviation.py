@@ -43,6 +43,7 @@ COVERAGE = 2.0
 NEIGHBOURS = 5
 """Points, itself among them, whose median tells whether a point stands alone."""
 SMALL = 0.25
+JUMP, GRAZING = 3.0, 0.1
 
 
 def far_off(value: Float) -> NDArray[np.bool_]:
@@ -172,18 +173,28 @@ def sigma_of_deviation(random: Float, systematic: Float) -> Float:
     return np.asarray(np.hypot(random, np.nan_to_num(systematic)))
 
 
-def verdicts(points: Float, value: Float, sigma: Float, lower: float, upper: float) -> Verdicts:
+def verdicts(
+    points: Float,
+    value: Float,
+    sigma: Float,
+    lower: float,
+    upper: float,
+    unsure: NDArray[np.bool_] | None = None,
+) -> Verdicts:
     """(m,) by ISO 14253-1: proved within, proved beyond, or undecided, as where sigma is NaN, of points (m, 3).
 
     U = 2 sigma for what is within, as the whole part is if all of it is. One place beyond is enough for it to be out,
     and of thousands of points some are beyond by two of their sigmas by chance: for what is beyond U is as large as
     lets chance find a single one of all of them as rarely as two sigmas do of one (Bonferroni), and the median of its
-    NEIGHBOURS has to be beyond the limit as well, as no stray point is a place of the part.
+    NEIGHBOURS has to be beyond the limit as well, as no stray point is a place of the part. unsure: (m,) points that
+    prove nothing beyond, as of `unsure_of_place`.
     """
     found = np.full(len(value), UNDECIDED, dtype=np.int8)
     found[(value - COVERAGE * sigma >= lower) & (value + COVERAGE * sigma <= upper)] = WITHIN
     uncertainty = coverage_of_all(len(value)) * sigma
     below, above = value + uncertainty < lower, value - uncertainty > upper
+    if unsure is not None:
+        below, above = below & ~unsure, above & ~unsure
     some = np.flatnonzero(below | above)
     if len(some):
         _, around = scipy.spatial.cKDTree(points).query(points[some], k=min(NEIGHBOURS, len(points)))
@@ -191,6 +202,26 @@ def verdicts(points: Float, value: Float, sigma: Float, lower: float, upper: flo
         found[some[below[some] & (local < lower)]] = BELOW
         found[some[above[some] & (local > upper)]] = ABOVE
     return found
+
+
+def unsure_of_place(
+    points: Float, value: Float, scan_line: Int, sigma_normal: Float, sigma_depth: Float
+) -> NDArray[np.bool_]:
+    """(m,) points whose deviation may be that of another place of the part: they lie beside an edge, or a wall is next.
+
+    The light of a scan line that an edge cuts is of both sides of it, and its point of neither: there the profile
+    bends by more than JUMP times the point's own deviation, or ends. A line does not measure a wall along which its
+    points err: of the wall's normal they have less than GRAZING of the sigma of their depth. scan_line: (m,), one more
+    from each to the next of one profile, and apart between profiles; sigmas: random, (m,) m.
+    """
+    order = np.argsort(scan_line, kind="stable")
+    bend = np.full(len(points), math.inf)
+    if len(points) > 2:
+        there = points[order]
+        beside = np.diff(scan_line[order]) == 1
+        inner = np.flatnonzero(beside[1:] & beside[:-1]) + 1
+        bend[order[inner]] = np.linalg.norm(there[inner - 1] - 2.0 * there[inner] + there[inner + 1], axis=1)
+    return np.asarray((bend > JUMP * np.abs(value)) | (sigma_normal < GRAZING * sigma_depth))
 
 
 def coverage_of_all(count: int) -> float:

@@ -15,6 +15,7 @@ from analysis.deviation import (
     WITHIN,
     far_off,
     sigma_of_deviation,
+    unsure_of_place,
     verdict_of,
     verdicts,
 )
@@ -160,7 +161,8 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
         return {"verdict": "", "mark": "", "rows": table, "note": note}
     lower = -math.inf if told.lower is None else told.lower
     upper = math.inf if told.upper is None else told.upper
-    judged = verdicts(rows["world"], value, _sigma(rows), lower, upper)
+    unsure = unsure_of_place(rows["world"], value, rows["index"], rows["sigma_off_surface"], rows["sigma_depth"])
+    judged = verdicts(rows["world"], value, _sigma(rows), lower, upper, unsure)
     shares = {key: float(np.mean(judged == key)) for key in (WITHIN, UNDECIDED, ABOVE, BELOW)}
     ends = ["none" if limit is None else f"{1e6 * limit:+.4g}" for limit in (told.lower, told.upper)]
     limits = f"{' / '.join(ends)}\u00a0µm"

@@ -100,7 +100,7 @@ def _what_is_out(record: dict[str, Any], alone: int) -> str:
     """The rule for what is outside or inside, and how many points come to less than it."""
     surely, points = record["coverage_beyond"], record["points"]
     rule = f"Outside and inside are places, not points: beyond by {surely:.1f} sigma, which chance does as rarely to"
-    told = f"{rule} any of {points} points as two sigma to one, and the median around beyond as well"
+    told = f"{rule} any of {points} points as two sigma to one, the median around beyond as well, and no edge beside"
     if not alone:
         return told
     are = "is" if alone == 1 else "are"

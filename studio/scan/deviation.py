@@ -31,6 +31,7 @@ from analysis.deviation import (
     sigma_of_deviation,
     three_two_one,
     turn_and_shift,
+    unsure_of_place,
     verdict_of,
     verdicts,
 )
@@ -59,6 +60,9 @@ CHORD = 1e-5
 TAKEN = ("x", "y", "z", "sigma_random", "sigma_systematic", "row", "laser", "step")
 ALONG_NORMAL = ("sigma_surface_random", "sigma_surface_systematic")
 """Not in files of former versions, and not known of photographs."""
+DEPTH = "sigma_depth_random"
+PROFILE = np.int64(1 << 32)
+"""Apart of the scan lines of two profiles."""
 MEANING = (
     "positive is outside the nominal part, too much material, negative inside; errors of depth and surface have the "
     "other sign, positive is too far from the camera"
@@ -209,7 +213,8 @@ def compare_cloud(scene: Scene, root: Path, cloud: Cloud, question: Question) ->
     made = deviations(points, eyes, vertices, triangles, aligned)
     judged = None
     if question.lower is not None or question.upper is not None:
-        judged = verdicts(made.points, made.value, sigma, *question.limits)
+        unsure = _unsure(cloud, points, made.value, here)
+        judged = verdicts(made.points, made.value, sigma, *question.limits, unsure)
     columns = {name: cloud[name][here] for name in ("laser", "step", "row")}
     towards = (eyes - points).mean(axis=0)
     others, is_bound = int(np.count_nonzero(~here)), not bool(known_normal[here].all())
@@ -276,6 +281,15 @@ def _sigma(cloud: Cloud) -> tuple[Float, NDArray[np.bool_]]:
     return np.where(here, along, whole), here
 
 
+def _unsure(cloud: Cloud, points: Float, value: Float, here: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """As of `unsure_of_place`, of the points (m, 3) that are `here` in the cloud."""
+    laser, step, row = (cloud[name][here].astype(np.int64) for name in ("laser", "step", "row"))
+    scan_line = (laser * (step.max(initial=0) + 1) + step) * PROFILE + row
+    unknown = np.full(len(value), np.nan)
+    normal, depth = (cloud[name][here] if name in cloud else unknown for name in (ALONG_NORMAL[0], DEPTH))
+    return unsure_of_place(points, value, scan_line, normal, depth)
+
+
 def _diagonal(vertices: Float, triangles: Int) -> float:
     """Of the box about what has triangles, m."""
     return float(np.linalg.norm(np.ptp(vertices[np.unique(triangles)], axis=0))) if len(triangles) else 0.0
@@ -315,7 +329,7 @@ def read_cloud(path: Path) -> Cloud:
         if missing:
             raise InputError("the points lack columns", where=str(path), found=f"no {', '.join(missing)}")
         whole = np.isfinite(piece["x"] + piece["y"] + piece["z"])
-        pieces.append({name: piece[name][whole] for name in (*TAKEN, *ALONG_NORMAL) if name in piece})
+        pieces.append({name: piece[name][whole] for name in (*TAKEN, *ALONG_NORMAL, DEPTH) if name in piece})
         count += int(whole.sum())
         if count > MOST_POINTS:
             raise InputError("so many points are not compared", where=str(path), allowed=f"at most {MOST_POINTS}")

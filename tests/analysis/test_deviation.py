@@ -18,6 +18,7 @@ from analysis.deviation import (
     deviations,
     three_two_one,
     turn_and_shift,
+    unsure_of_place,
     verdict_of,
     verdicts,
 )
@@ -162,6 +163,42 @@ def test_noise_alone_puts_no_perfect_part_out_and_a_dent_does() -> None:
     # a single point is found beyond two of its sigmas in 2.3 % of cases; the neighbours' median makes it rarer
     most = scipy.stats.binom.ppf(0.999, 300, scipy.stats.norm.sf(2.0))
     assert out[0.0] <= most and out[1.0] == 0
+
+
+def profiles(count: int = 5, rows: int = 21, pitch: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Points on a plane, as of profiles side by side, and their scan lines."""
+    profile, row = (one.ravel() for one in np.meshgrid(np.arange(count), np.arange(rows), indexing="ij"))
+    return np.column_stack([pitch * row, pitch * profile, 0.0 * row]), 1000 * profile + row
+
+
+def test_points_beside_an_edge_put_no_part_out_and_a_dent_does() -> None:
+    """A part against itself failed by points in the air beside its edges, which scan lines of both sides make."""
+    points, scan_line = profiles()
+    value, sigma, depth = np.zeros(len(points)), np.full(len(points), 1e-3), np.full(len(points), 1e-3)
+    edge = points[:, 0] == 10.0
+    points[points[:, 0] > 10.0, 2] = -5.0
+    points[edge, 2] -= 0.5
+    value[edge] = -0.5
+    unsure = unsure_of_place(points, value, scan_line, sigma, depth)
+    assert unsure[edge].all() and not unsure[(points[:, 0] > 11.5) & (points[:, 0] < 19.5)].any()
+    assert verdict_of(verdicts(points, value, sigma, -0.1, 0.1)) == "fail"
+    assert verdict_of(verdicts(points, value, sigma, -0.1, 0.1, unsure)) == "undecided"
+    dent = (points[:, 0] >= 4.0) & (points[:, 0] <= 6.0)
+    points[dent, 2] -= 0.3
+    value[dent] = -0.3
+    unsure = unsure_of_place(points, value, scan_line, sigma, depth)
+    found = verdicts(points, value, sigma, -0.1, 0.1, unsure)
+    assert verdict_of(found) == "fail" and np.array_equal(found == BELOW, dent)
+
+
+def test_a_wall_along_which_points_err_is_not_measured_by_them() -> None:
+    points, scan_line = profiles()
+    value, depth = np.full(len(points), 0.5), np.full(len(points), 1e-2)
+    inner = (points[:, 0] > 0.5) & (points[:, 0] < 19.5)
+    assert unsure_of_place(points, value, scan_line, 0.02 * depth, depth).all()
+    assert not unsure_of_place(points, value, scan_line, 0.5 * depth, depth)[inner].any()
+    unknown = np.full(len(points), np.nan)
+    assert not unsure_of_place(points, value, scan_line, unknown, unknown)[inner].any(), "of former files"
 
 
 def test_a_stray_point_puts_no_part_out_and_keeps_it_from_passing() -> None:
