@@ -15,6 +15,7 @@ from studio.qt.viewport.viewport_scene import Lines
 from studio.scan.measures_in_3d import MeasureIn3D
 
 MEASURE_PX, FONT_PX = 3.0, 13
+NOT_IN_THE_FONT = str.maketrans({"✓": None, "✗": None, "\u00a0": " "})
 GROUND = 0.9
 """Opacity of what a text stands on, over points of any colour."""
 
@@ -34,14 +35,17 @@ class MeasureMarks(QObject):
 
     def draw(self) -> None:
         """All anew: they are few."""
-        renderer = self.view.renderer
-        for actor in (*(one.actor for one in self._lines), *self.labels):
-            renderer.RemoveActor(actor)
+        for line in self._lines:
+            self.view.renderer.RemoveActor(line.actor)
+        for label in self.labels:
+            self.view.front.RemoveActor(label)
         self._lines, self.labels = [], []
         for one in self.session.measures_in_3d if self.cloud.visible else ():
             self._add(one)
-        for actor in (*(one.actor for one in self._lines), *self.labels):
-            renderer.AddActor(actor)
+        for line in self._lines:
+            self.view.renderer.AddActor(line.actor)
+        for label in self.labels:  # before all points, which would cover its first letters
+            self.view.front.AddActor(label)
         self.view.redraw()
 
     def _add(self, one: MeasureIn3D) -> None:
@@ -54,7 +58,7 @@ class MeasureMarks(QObject):
             drawn.actor.PickableOff()
             self._lines.append(drawn)
         label = vtkBillboardTextActor3D()
-        label.SetInput(one.text)
+        label.SetInput(" ".join(one.text.translate(NOT_IN_THE_FONT).split()))
         label.SetPosition(*at_step(one.place[None], scene, step)[0])
         label.SetDisplayOffset(8, 8)
         look = label.GetTextProperty()

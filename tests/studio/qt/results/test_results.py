@@ -269,7 +269,7 @@ def test_a_measure_stands_in_3d_where_it_was_read_with_its_verdict(
     assert max(nearest) < 0.004
     assert np.linalg.norm(np.diff(one.lines[-1][[0, -1]], axis=0)) == pytest.approx(abs(value), rel=1e-3)
     marks = next(child for child in cloud.view.children() if isinstance(child, MeasureMarks))
-    assert [label.GetInput() for label in marks.labels] == [one.text]
+    assert [label.GetInput() for label in marks.labels] == [one.text.replace("\u00a0", " ")]
     session.set(("measures",), (gauge.model_copy(update={"nominal": value, "lower": -0.005, "upper": 0.005}),))
     assert session.measures_in_3d[0].verdict == "pass" and "pass" in marks.labels[0].GetInput()
     # it goes with the points that it was read off
