@@ -299,6 +299,7 @@ class FileActions(QObject):
 
     def _save(self, path: Path) -> bool:
         document = self.session.document
+        before = document.project.name
         try:
             carry(document.project, document.root, path.absolute().parent)
             document.save(path.absolute(), self._name_in(path))
@@ -308,7 +309,9 @@ class FileActions(QObject):
         self.autosave.forget()
         self.count_as_saved(document.project)
         self.preferences.add_recent(path)
-        self.session.message.emit("info", f"Saved {path}")
+        now = document.project.name
+        called = "" if now == before else f"; the project is now called “{now}” after its file (it was “{before}”)"
+        self.session.message.emit("info", f"Saved {path}{called}")
         return True
 
     def _name_in(self, path: Path) -> str | None:
