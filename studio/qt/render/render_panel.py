@@ -33,7 +33,7 @@ from studio.qt.render.render_texts import error_text, plan_text
 from studio.runtime.jobs import Job, Progress, State
 from studio.scan.stages import scaled
 
-SCALES = (0.125, 0.25, 0.5, 1.0)
+SCALES = (1.0, 0.5, 0.25, 0.125)
 TRANSPORT = {
     "auto": "A pilot measures what each further step adds, and leaves out what is negligible",
     "direct": "To one surface",
@@ -277,8 +277,6 @@ class RenderPanel(QWidget):
         for box in (self.laser_error, self.ambient_error, self.samples, self.goal):
             box.blockSignals(False)
         camera, chosen = project.scene.camera, max(0, self.scale.currentIndex())
-        if self.scale.count() == 0:
-            chosen = len(SCALES) - 1
         sizes = []
         for scale in SCALES:
             small = camera.scaled(scale)

@@ -65,7 +65,7 @@ def rendered(window: MainWindow, qtbot: QtBot) -> Render:
 
 def render(window: MainWindow, qtbot: QtBot) -> Render:
     panel = window.panels["render"]
-    panel.scale.setCurrentIndex(panel.scale.count() - 1)  # type: ignore[attr-defined]
+    panel.scale.setCurrentIndex(panel.scale.findData(1.0))  # type: ignore[attr-defined]
     qtbot.keyClick(window, Qt.Key.Key_F5)
     return rendered(window, qtbot)
 
