@@ -15,7 +15,7 @@ LABEL, VALUE, SENTENCE = 22, 38, 62
 """Letters on a line of a table's label and value, and of a sentence as wide as a column."""
 TITLE, ROW = 2.5, 1.25
 """Lines that a title and a row of a table take, with the space around them."""
-PAGE = 48.0
+PAGE = 52.0
 """Lines of a column of the PDF, so that a block of two never needs to be broken."""
 
 
