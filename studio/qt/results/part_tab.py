@@ -33,6 +33,7 @@ from studio.qt.core.widgets import keep_room, text_button
 from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.part_drawing import PartDrawing
 from studio.qt.results.part_editor import PartEditor
+from studio.qt.results.part_menu import PartMenu
 from studio.qt.results.part_steps import PartSteps
 from studio.qt.results.results_profile import ProfilePlot
 from studio.qt.results.scan_bar import ScanBar
@@ -82,6 +83,7 @@ class PartTab(QWidget):
         self.add: QPushButton = text_button("Add", "Read another dimension off the profile")
         self.remove = text_button("Delete", "The chosen measure (Del in the table)")
         self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # by Tab it would get a space meant for the table
+        self.menu = PartMenu(session, self.table, self.delete)
         self.section = ChoiceBox()
         for value, title in SECTIONS.items():
             self.section.addItem(title, value)
