@@ -45,7 +45,8 @@ def known_scanner(path: Path) -> tuple[CalibratedCamera, KnownScanner, str | Non
         cure = "calibrate again by main.py calibrate scanner"
         raise InputError("the calibration tells no errors of its planes", where=str(path), cure=cure)
     lasers = tuple(
-        _laser(np.array(plane), np.array(rows)) for plane, rows in zip(found.planes, found.covariances, strict=True)
+        known_laser(np.array(plane), np.array(rows))
+        for plane, rows in zip(found.planes, found.covariances, strict=True)
     )
     count = 4 + len(camera.distortion)
     covariance = np.zeros((count, count)) if known.covariance is None else known.covariance
@@ -70,7 +71,7 @@ def check_size(camera: CalibratedCamera, size: tuple[int, int], where: str) -> N
         raise InputError("the photographs are not of that camera", where=where, found=found, allowed=allowed)
 
 
-def _laser(plane: Float, covariance: Float) -> KnownLaser:
+def known_laser(plane: Float, covariance: Float) -> KnownLaser:
     """From a file's order, fx, fy, cx, cy, a, b, c, d and distortion, to the camera and then m = -n / d."""
     count = len(covariance)
     a_d = slice(4, 8)

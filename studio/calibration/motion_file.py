@@ -25,6 +25,8 @@ COLUMNS: dict[Kind, tuple[str, ...]] = {
     "turntable": ("angle_deg",),
     "hand_eye": ("x_mm", "y_mm", "z_mm", "qx", "qy", "qz", "qw"),
 }
+EXACT = "exact"
+"""In place of a sigma."""
 FORMS = "; ".join(", ".join(("view", *columns)) for columns in COLUMNS.values())
 
 
@@ -109,8 +111,14 @@ def motion_values(estimate: Estimate) -> dict[str, Any] | None:
 def motion_rows(result: Calibrated) -> list[tuple[str, str, str]]:
     """Name, value and sigma, as a person reads them."""
     data = motion_data(result)
-    if data is None:
-        return []
+    return [] if data is None else rows_of_motion(data)
+
+
+def rows_of_motion(data: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """The same of what `motion_data` gives, or a project holds; without a covariance it is exact."""
+    if not len(data["covariance"]):
+        nothing = np.zeros((3, 3) if data["kind"] == "stage" else (6, 6))
+        return [(name, value, EXACT) for name, value, _ in rows_of_motion({**data, "covariance": nothing})]
     spread = np.array(data["covariance"])
     sigma = np.sqrt(np.maximum(np.diag(spread), 0.0))
     if data["kind"] == "stage":

@@ -7,12 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from analysis.calibration.calibrate import Calibrated
+from analysis.calibration.depth import Volume
 from analysis.calibration.estimate import unit_plane
 from analysis.calibration.lens_choice import PROOF, LensTrial
 from analysis.calibration.next_pose import Advice
 from analysis.calibration.recheck import Part, Recheck
-from studio.calibration.motion_file import motion_rows
+from render.base.arrays import Float
+from studio.calibration.motion_file import EXACT, motion_rows
 
+WARP = "board warp um"
+"""How far the board's middle stands out of its edges: along x, and along y."""
 SMALL_GAIN = 0.03
 """Of the depth error: what one more view should take off it to be worth while."""
 
@@ -26,29 +30,48 @@ def parameter_rows(result: Calibrated, names: Sequence[str] = ()) -> list[tuple[
     """Name, value and sigma of everything that was estimated; names of the lasers."""
     estimate, covariance = result.estimate, result.adjusted.solution.covariance
     sigma = np.sqrt(np.diag(covariance))
-    rows = []
-    for i, name in enumerate(estimate.names[: estimate.camera_count]):
-        digits = ".3f" if i < 4 else ".6g"
-        unit = " px" if i < 4 else ""
-        rows.append((name + unit, f"{estimate.shared[i]:{digits}}", f"{sigma[i]:.2g}"))
+    camera = slice(0, estimate.camera_count)
+    rows = camera_rows(estimate.names[camera], estimate.shared[camera], sigma[camera])
     for i, m in enumerate(estimate.planes):
-        a, b, c, d = unit_plane(m)
         own = estimate.plane_slice(i)
-        along = np.linalg.eigvalsh(covariance[own, own])[-1] ** 0.5 / np.linalg.norm(m)
-        laser = laser_name(i, names)
-        rows.append((f"{laser}: normal", f"{a:.6f} {b:.6f} {c:.6f}", f"{1e3 * along:.2g} mrad"))
-        by_d = m / np.linalg.norm(m) ** 3
-        rows.append(
-            (f"{laser}: distance mm", f"{-1e3 * d:.4f}", f"{1e3 * np.sqrt(by_d @ covariance[own, own] @ by_d):.2g}")
-        )
+        rows += plane_rows(laser_name(i, names), m, covariance[own, own])
     rows += motion_rows(result)
     warp = 1e6 * estimate.warp
     at = estimate.camera_count
     if result.adjusted.solution.free[at]:
-        rows.append(
-            ("board warp um", f"{round(warp[0])} {round(warp[1])}", f"{1e6 * sigma[at]:.2g} {1e6 * sigma[at + 1]:.2g}")
-        )
+        rows.append((WARP, f"{round(warp[0])} {round(warp[1])}", f"{1e6 * sigma[at]:.2g} {1e6 * sigma[at + 1]:.2g}"))
     return rows
+
+
+def camera_rows(
+    names: Sequence[str], values: Sequence[float] | Float, sigma: Float | None
+) -> list[tuple[str, str, str]]:
+    """Of fx, fy, cx, cy and the distortion; sigma None or NaN: exact."""
+    rows = []
+    for i, (name, value) in enumerate(zip(names, values, strict=True)):
+        digits, unit = (".3f", " px") if i < 4 else (".6g", "")
+        told = EXACT if sigma is None or np.isnan(sigma[i]) else f"{sigma[i]:.2g}"
+        rows.append((name + unit, f"{value:{digits}}", told))
+    return rows
+
+
+def plane_rows(laser: str, m: Float, covariance: Float | None) -> list[tuple[str, str, str]]:
+    """Of a laser's plane m . P = 1; covariance (3, 3) of m, None: exact."""
+    a, b, c, d = unit_plane(m)
+    turn, way = EXACT, EXACT
+    if covariance is not None:
+        by_d = m / np.linalg.norm(m) ** 3
+        most, along = np.maximum([np.linalg.eigvalsh(covariance)[-1], by_d @ covariance @ by_d], 0.0)
+        turn, way = f"{1e3 * np.sqrt(most) / np.linalg.norm(m):.2g} mrad", f"{1e3 * np.sqrt(along):.2g}"
+    return [
+        (f"{laser}: normal", f"{a:.6f} {b:.6f} {c:.6f}", turn),
+        (f"{laser}: distance mm", f"{-1e3 * d:.4f}", way),
+    ]
+
+
+def span_of(laser: str, volume: Volume) -> str:
+    """Where a laser's depth is told."""
+    return f"{laser}, {volume.depth.min():.3g} to {volume.depth.max():.3g} m"
 
 
 def depth_rows(
@@ -59,7 +82,7 @@ def depth_rows(
     for i, one in enumerate(result.depth):
         random = float(np.sqrt(np.mean(one.random**2)))
         cells = [one.rms, float(one.systematic.max()), random] + ([true[i][0]] if true else [])
-        span = f"{laser_name(one.volume.laser, names)}, {one.volume.depth.min():.3g} to {one.volume.depth.max():.3g} m"
+        span = span_of(laser_name(one.volume.laser, names), one.volume)
         rows.append((span, *(f"{1e6 * cell:.1f}" for cell in cells)))
     return rows
 

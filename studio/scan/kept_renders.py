@@ -145,13 +145,38 @@ def kept_renders(root: Path) -> tuple[list[Kept], list[str]]:
 
 def open_kept(kept: Kept, root: Path) -> Frame:
     """The light of a kept render, bit for bit. InputError: it is not there, damaged, or a mesh has changed since."""
-    if kept.folder is None:
-        raise InputError("the render was not kept", where=kept.name)
-    record = read_object(kept.folder / RECORD, "kept render")
+    folder = _folder(kept)
+    record = read_object(folder / RECORD, "kept render")
     inputs = record.get("inputs")
     cure = "restore the files, or render again"
     check_unchanged(inputs if isinstance(inputs, dict) else {}, kept.project.scene, root, cure=cure)
-    return read_frame(kept.folder / f"{STEM}.json")
+    return read_frame(folder / f"{STEM}.json")
+
+
+def rename(kept: Kept, name: str) -> None:
+    """Call a kept render otherwise; its folder stays. InputError: it is not there, damaged, or cannot be written."""
+    record = read_object(_folder(kept) / RECORD, "kept render")
+    with atomic_write(_folder(kept) / RECORD) as temporary:
+        temporary.write_text(json.dumps(record | {"name": name}, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def remove(kept: Kept) -> None:
+    """Take a kept render's files off the disk; others that lie beside them stay. InputError: one cannot be removed."""
+    folder = _folder(kept)
+    try:
+        # the record first: what is left of a removal that fails is no kept render
+        for name in (RECORD, PROJECT, f"{STEM}.json", f"{STEM}.exr"):
+            (folder / name).unlink(missing_ok=True)
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+    except OSError as error:
+        raise InputError("a file cannot be removed", where=str(folder), found=error.strerror or error) from error
+
+
+def _folder(kept: Kept) -> Path:
+    if kept.folder is None:
+        raise InputError("the render was not kept", where=kept.name)
+    return kept.folder
 
 
 def _read(path: Path) -> Kept:

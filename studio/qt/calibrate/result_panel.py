@@ -1,4 +1,7 @@
-"""What was found, how good it is, and whether it may be believed: the sentences and tables of the command line."""
+"""What was found, how good it is, and whether it may be believed: the sentences and tables of the command line.
+
+While nothing was calibrated in the session, the calibration that the project has.
+"""
 
 from __future__ import annotations
 
@@ -7,26 +10,39 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QFrame, QTextBrowser, QVBoxLayout, QWidget
 
+from studio.project.calibration import Calibration
 from studio.qt.calibrate.calibration_work import CalibrationWork
+from studio.qt.calibrate.own_depths import OwnDepths
 from studio.qt.core import theme
 from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import flush
 
 if TYPE_CHECKING:
     from analysis.calibration.recheck import Recheck
+    from studio.calibration.project_calibration import OwnDepth
     from studio.calibration.solving import Solved
+    from studio.project.project import Project
 
 EMPTY = "What is found is told here: parameters with their sigmas, the depth error that they make together, and checks."
+WORKING = "How far depth is off by it is being worked out."
+OWN = "The project's calibration"
+TRUE = "True is how far it is off the scene's camera and laser planes."
+BOARD_WARP = (
+    "<p>How far the board's middle stands out of the plane of its edges: the first number along its rows, the second "
+    "along its columns, each with its sigma. It is found with everything else; a flat board has 0.</p>"
+)
 
 
 class CalibrationPanel(QWidget):
-    """Follows the `CalibrationWork` of the session; its text can be copied."""
+    """Follows the `CalibrationWork` and the project of the session; its text can be copied."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.work = one_of(CalibrationWork, session)
+        self.session, self.work = session, one_of(CalibrationWork, session)
+        self.depths = OwnDepths(self.work, self)
         self.text = QTextBrowser()
         self.text.setOpenLinks(False)
         self.text.setFrameShape(QFrame.Shape.NoFrame)
@@ -34,20 +50,44 @@ class CalibrationPanel(QWidget):
         self.text.setAccessibleName("Calibration")
         self.text.document().setDocumentMargin(10)
         flush(QVBoxLayout(self), self.text)
-        self.work.solved_changed.connect(self.refresh)
+        for changed in (self.work.solved_changed, self.depths.changed):
+            changed.connect(self.refresh)
+        session.project_changed.connect(self._follow_project)
         theme.notice.changed.connect(self.refresh)
+        self._own: Calibration | None = None
+        """The project's, as it is told."""
         self.refresh()
 
     def refresh(self) -> None:
-        solved = self.work.solved
+        solved, project = self.work.solved, self.session.project
         place = self.text.verticalScrollBar().value()
         if self.work.checked is not None:
             self.text.setHtml(check_page(self.work.checked))
+        elif self.tells_own and self.isVisible():
+            self.depths.want()
+            self.text.setHtml(own_page(project, self.depths.found, self.depths.problem))
         elif solved is None:
             self.text.setHtml(f"<p style='color: {theme.colours().muted}'>{EMPTY}</p>")
         else:
             self.text.setHtml(page(solved, self.work.target_um, self.work.note))
         self.text.verticalScrollBar().setValue(place)
+
+    @property
+    def tells_own(self) -> bool:
+        """Nothing was calibrated in this session, and the project has a calibration."""
+        found = self.work.solved is not None or self.work.checked is not None
+        return not found and self.session.project.calibration != Calibration()
+
+    def _follow_project(self) -> None:
+        told = self._own
+        self._own = self.session.project.calibration if self.tells_own else None
+        changed = self._own is not told or (self._own is not None and self.depths.old)
+        if changed and self.isVisible():
+            self.refresh()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.refresh()
 
 
 def page(solved: Solved, target_um: float | None, note: str = "") -> str:
@@ -75,6 +115,23 @@ def page(solved: Solved, target_um: float | None, note: str = "") -> str:
     return "".join(parts).replace(" um", " µm")
 
 
+def own_page(project: Project, found: Sequence[OwnDepth] | None, problem: str = "") -> str:
+    """The project's own; found: what it does to depth, None: that is being worked out, or cannot be, which is told."""
+    from studio.calibration.project_calibration import own_depth_rows, own_notes, own_rows
+
+    muted = f"<p style='color: {theme.colours().muted}'>"
+    parts, notes = [f"<p><b>{OWN}</b>, which its points are made with</p>"], own_notes(project)
+    if found is None:
+        parts.append(f"{muted}{escape(problem or WORKING)}</p>")
+    parts.append("<p></p>")
+    if found:
+        parts += [_table(["Depth error / um", "rms", "worst", "true"], own_depth_rows(project, found)), "<p></p>"]
+        notes = [TRUE, *notes] if any(one.true is not None for one in found) else notes
+    parts.append(_table(["Parameter", "value", "sigma"], own_rows(project)))
+    parts += ["<p></p>", f"{muted}{escape(' '.join(notes))}</p>"]
+    return "".join(parts).replace(" um", " µm")
+
+
 def check_page(checked: Recheck) -> str:
     """Whether a calibration still holds, and how far each part of it is off."""
     from studio.calibration.words import recheck_sentence, recheck_verdict
@@ -98,8 +155,15 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     )
     lines = "".join(
         "<tr>"
-        + "".join(f"<td align='{'right' if i else 'left'}'>{escape(text)}</td>" for i, text in enumerate(row))
+        + "".join(f"<td align='{'right' if i else 'left'}'>{_cell(text)}</td>" for i, text in enumerate(row))
         + "</tr>"
         for row in rows
     )
     return f"<table width='100%' cellspacing='0' cellpadding='3'><tr>{head}</tr>{lines}</table>"
+
+
+def _cell(text: str) -> str:
+    """With what explains it where the mouse rests, underlined."""
+    from studio.calibration.words import WARP
+
+    return f'<u title="{BOARD_WARP}">{escape(text)}</u>' if text == WARP else escape(text)

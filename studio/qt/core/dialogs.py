@@ -85,6 +85,11 @@ def ask_loss(parent: QWidget, what: str) -> bool:
     return _ask_to_go(parent, "not-kept", "Not kept", "Close without it?", "Close", what)
 
 
+def ask_removal(parent: QWidget, what: str) -> bool:
+    """Whether to take files off the disk; what: sentences about them."""
+    return _ask_to_go(parent, "removal", "Kept with the project", "Remove it from the disk?", "Remove", what)
+
+
 def _ask_to_go(parent: QWidget, name: str, title: str, question: str, go: str, what: str) -> bool:
     """go: the button that goes on; Return and Esc stay."""
     box = QMessageBox(QMessageBox.Icon.Question, title, question, parent=parent)

@@ -72,8 +72,8 @@ class Render:
     """What `inspect` warns of, by the settings that `measurements` were made with."""
     asked: bool = True
     """False: the program made it unasked, as its first picture."""
-    kept: bool = False
-    """It is with the project's files, too."""
+    kept: Path | None = None
+    """Where it is with the project's files, too; None: nowhere."""
     cell: str = ""
     """Key of the study's cell that it is: developed and measured by its own `source`, whatever the open project has."""
 

@@ -1,10 +1,12 @@
-"""The renders made so far: look at one again, name it, delete it, compare two."""
+"""The renders made so far and those kept with the project: look at one again, name it, delete it, compare two."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from PySide6.QtCore import QItemSelectionModel, QModelIndex, QPersistentModelIndex, QPoint, QSize, Qt
-from PySide6.QtGui import QIcon, QImage, QPixmap
+from PySide6.QtGui import QColor, QIcon, QImage, QPalette, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -22,13 +24,16 @@ from PySide6.QtWidgets import (
 from render.base.errors import InputError
 from render.output.tone_mapping import Picture, grey
 from render.plan import GroupQuality
+from studio.qt.core import theme
 from studio.qt.core.delete_key import DeleteKey
-from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.dialogs import ask_removal, show_trouble
 from studio.qt.core.session import Render, Session
 from studio.qt.image.compare_view import CompareView
+from studio.qt.render.kept_list import MARK, Entry, KeptList, kept_lines, kept_tip, place_holder
 from studio.qt.render.python_copy import copy_as_python
-from studio.qt.render.render_table import RenderTable, keep_render
+from studio.qt.render.render_table import RenderTable, keep_render, open_render
 from studio.runtime.error_messages import trouble
+from studio.scan.kept_renders import Kept, remove
 from studio.scan.remarks import scale_name, scale_notes
 
 THUMBNAIL = QSize(48, 40)
@@ -40,13 +45,14 @@ NEW_LINE = "\u2028"
 """Qt breaks an item's text only here."""
 NAMING = "A name keeps no settings: a render is developed as the project is then whenever it is shown."
 KEEPING = "Its light, its settings and its figures as they are read now are kept, whatever the project becomes."
+CLOSING = "Out of this session's renders; it stays kept with the project."
 SAMPLED = 512
 """Pixels a side that a thumbnail looks at."""
 
 
-def title(render: Render) -> str:
+def title(render: Entry) -> str:
     """As the list shows it."""
-    return render.name or f"Render {render.number}"
+    return render.name if isinstance(render, Kept) else render.name or f"Render {render.number}"
 
 
 def named(render: Render) -> str:
@@ -116,32 +122,41 @@ def thumbnail(render: Render) -> Picture | None:
 
 
 class _ThreeLines(QStyledItemDelegate):
-    """The description below the name, which alone is edited."""
+    """The description below the name, which alone is edited; what is not open is muted."""
+
+    def __init__(self, parent: QWidget, kept: KeptList) -> None:
+        super().__init__(parent)
+        self.kept = kept
 
     def initStyleOption(self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex) -> None:
         super().initStyleOption(option, index)
-        render: Render = index.data(Qt.ItemDataRole.UserRole)
-        option.text = NEW_LINE.join([title(render), *in_short(render)])
+        entry: Entry = index.data(Qt.ItemDataRole.UserRole)
+        head = title(entry) + (MARK if self.kept.of(entry) is not None else "")
+        lines = kept_lines(entry) if isinstance(entry, Kept) else in_short(entry)
+        option.text = NEW_LINE.join([head, *lines])
+        if isinstance(entry, Kept):
+            option.palette.setColor(QPalette.ColorRole.Text, QColor(theme.colours().muted))
 
 
 class History(QWidget):
-    """A list of the session's renders, the latest first."""
+    """A list of the session's renders, the latest first, and below them of those that the project keeps."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.session = session
+        self.session, self.kept = session, KeptList(session)
         self.comparison: CompareView | None = None
         self.list = QListWidget()
         self.list.setIconSize(THUMBNAIL)
         self.list.setMinimumHeight(ENTRIES * ENTRY_HEIGHT)
-        self.list.setItemDelegate(_ThreeLines(self.list))
+        self.list.setItemDelegate(_ThreeLines(self.list, self.kept))
         self.list.setWordWrap(True)
         self.list.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.list.setEditTriggers(QAbstractItemView.EditTrigger.EditKeyPressed)
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.list.setUniformItemSizes(True)
         self.list.setToolTip(
-            f"Click shows a render, F2 names it, Delete removes it; select two to compare them.\n{NAMING}\n"
+            "Click or Return shows a render, and opens one that is kept; F2 names it, Delete removes it; select two to "
+            f"compare them.\n{NAMING}\n"
             f"Keep with the project, in the menu: {KEEPING[:1].lower()}{KEEPING[1:]}"
         )
         DeleteKey(self.list, self.delete)
@@ -152,6 +167,8 @@ class History(QWidget):
         self.delete_button = QPushButton("Delete")
         self.table_button = QPushButton("Table")
         self.table_button.setToolTip("Figures and settings of all renders, and of those kept with the project")
+        self.broken = QLabel(wordWrap=True)
+        self.broken.setObjectName("muted")
         top = QHBoxLayout()
         top.addWidget(heading, 1)
         top.addWidget(self.table_button)
@@ -161,64 +178,92 @@ class History(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addLayout(top)
         layout.addWidget(self.list, 1)
+        layout.addWidget(self.broken)
         session.renders_changed.connect(self.refresh)
         session.developed.connect(self._new_images)
         session.document_replaced.connect(self._forget_comparison)
+        session.document_replaced.connect(self._read_kept)
+        session.project_changed.connect(self._follow_folder)
         self.list.itemClicked.connect(self._clicked)
+        self.list.itemActivated.connect(self._clicked)
         self.list.itemChanged.connect(self._renamed)
         self.list.itemSelectionChanged.connect(self._show_buttons)
         self.list.customContextMenuRequested.connect(self._menu)
         self.compare_button.clicked.connect(self.compare)
         self.delete_button.clicked.connect(self.delete)
         self.table_button.clicked.connect(self.open_table)
-        self.refresh()
+        self._read_kept()
 
-    def selected(self) -> list[Render]:
+    def selected(self) -> list[Entry]:
         """In the order of the list."""
         rows = sorted(self.list.row(item) for item in self.list.selectedItems())
-        return [self._render(row) for row in rows]
+        return [self._entry(row) for row in rows]
 
     def refresh(self) -> None:
         """Follow the session's list; selection stays where it can."""
-        shown, renders = self.session.shown, self.session.renders[::-1]
-        there = [self._render(row) for row in range(self.list.count())]
-        same = len(there) == len(renders) and all(a is b for a, b in zip(there, renders, strict=True))
+        shown, entries = self.session.shown, self.kept.rows()
         before = [] if len(self.selected()) < 2 else self.selected()
         self.list.blockSignals(True)
-        if not same:
+        if self.list.count() != len(entries):
             self.list.clear()
-            for render in renders:
+            for entry in entries:
                 item = QListWidgetItem()
-                item.setData(Qt.ItemDataRole.UserRole, render)
+                item.setData(Qt.ItemDataRole.UserRole, entry)
                 item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable)
                 self.list.addItem(item)
-        for row, render in enumerate(renders):
+        for row, entry in enumerate(entries):
             item = self.list.item(row)
-            self._fill(item, render)
-            item.setSelected(any(render is other for other in before) if before else render is shown)
-            if render is shown:
+            self._fill(item, entry)
+            item.setSelected(any(entry is other for other in before) if before else entry is shown)
+            if entry is shown:
                 self.list.setCurrentItem(item, QItemSelectionModel.SelectionFlag.NoUpdate)
         self.list.blockSignals(False)
         self._show_buttons()
 
-    def _render(self, row: int) -> Render:
-        found: Render = self.list.item(row).data(Qt.ItemDataRole.UserRole)
+    def _entry(self, row: int) -> Entry:
+        found: Entry = self.list.item(row).data(Qt.ItemDataRole.UserRole)
         return found
 
     def delete(self) -> None:
-        """Forget the selected renders; the latest of the others is shown."""
-        session, gone = self.session, self.selected()
+        """Forget the selected renders; those that are kept go from the disk as well, which is asked about."""
+        gone = self.selected()
+        kept = [one for one in map(self.kept.of, gone) if one is not None]
+        if kept and not ask_removal(self.window(), _removal(kept)):
+            return
+        try:
+            for one in kept:
+                remove(one)
+        except InputError as error:
+            show_trouble(self.window(), trouble(error, "remove the render"))
+            gone = [one for one in gone if self.kept.of(one) is None]
+        self.kept.read()
+        self.forget(gone)
+
+    def forget(self, gone: Sequence[Entry]) -> None:
+        """Out of the session, whatever the disk holds; the latest of the others is shown."""
+        session = self.session
         session.renders = [render for render in session.renders if not any(render is other for other in gone)]
         if any(session.shown is render for render in gone):
             session.shown = session.renders[-1] if session.renders else None
         session.renders_changed.emit()
 
+    def open(self, entry: Entry) -> Render | None:
+        """A kept one with its light, shown; None: it cannot be opened, which is told."""
+        if isinstance(entry, Render):
+            return entry
+        try:
+            return open_render(self.session, entry)
+        except InputError as error:
+            show_trouble(self.window(), trouble(error, f"open {entry.name}"))
+            return None
+
     def compare(self) -> None:
-        """Open two renders in a window of their own: the selected ones, or the shown one and the one before it."""
-        pair = self.selected()
-        if len(pair) != 2:
-            return
+        """Open the two selected renders in a window of their own."""
+        selected = self.selected()
+        pair = [self.open(entry) for entry in selected] if len(selected) == 2 else [None, None]
         later, earlier = pair
+        if later is None or earlier is None:
+            return
         if self.comparison is None:
             self.comparison = CompareView(self)
         self.comparison.compare(earlier, named(earlier), later, named(later))
@@ -237,13 +282,32 @@ class History(QWidget):
             keep_render(self.session, render, title(render))
         except InputError as error:
             show_trouble(self.window(), trouble(error, "keep the render"))
+        self._read_kept()
+
+    def _read_kept(self) -> None:
+        self.kept.read()
+        count = len(self.kept.wrong)
+        self.broken.setText(f"{count} kept render{'' if count == 1 else 's'} cannot be read" if count else "")
+        self.broken.setToolTip("\n".join(self.kept.wrong))
+        self.broken.setVisible(count > 0)
+        self.refresh()
+
+    def _follow_folder(self) -> None:
+        if self.kept.elsewhere:
+            self._read_kept()
 
     def _forget_comparison(self) -> None:
         if self.comparison is not None:
             self.comparison.forget()
 
-    def _fill(self, item: QListWidgetItem, render: Render) -> None:
+    def _fill(self, item: QListWidgetItem, render: Entry) -> None:
+        if item.data(Qt.ItemDataRole.UserRole) is not render:
+            item.setData(Qt.ItemDataRole.UserRole, render)
         item.setText(title(render))
+        if isinstance(render, Kept):
+            item.setToolTip(kept_tip(render))
+            item.setIcon(place_holder())
+            return
         when = f", {render.created}" if render.created else ""
         item.setToolTip("\n".join([f"{describe(render)}{when}", *scale_notes(render.scanner_scale)]))
         picture = thumbnail(render)
@@ -255,21 +319,35 @@ class History(QWidget):
     def _new_images(self) -> None:
         self.list.blockSignals(True)
         for row in range(self.list.count()):
-            if self._render(row) is self.session.shown:
-                self._fill(self.list.item(row), self._render(row))
+            if self._entry(row) is self.session.shown:
+                self._fill(self.list.item(row), self._entry(row))
         self.list.blockSignals(False)
 
     def _clicked(self, item: QListWidgetItem) -> None:
-        render = item.data(Qt.ItemDataRole.UserRole)
-        if len(self.list.selectedItems()) == 1 and render is not self.session.shown:
-            self.session.show(render)
+        entry = item.data(Qt.ItemDataRole.UserRole)
+        if len(self.list.selectedItems()) == 1 and entry is not self.session.shown:
+            self.show_entry(entry)
+
+    def show_entry(self, entry: Entry) -> None:
+        """A render of the session as it is, a kept one with its light."""
+        if isinstance(entry, Render):
+            self.session.show(entry)
+        else:
+            self.open(entry)
 
     def _renamed(self, item: QListWidgetItem) -> None:
-        render = item.data(Qt.ItemDataRole.UserRole)
-        name = item.text().strip()
-        if name != title(render):
-            render.name = name
-            self.session.renders_changed.emit()
+        entry: Entry = item.data(Qt.ItemDataRole.UserRole)
+        name, kept = item.text().strip(), self.kept.of(entry)
+        if name == title(entry):
+            return
+        if isinstance(entry, Render):
+            entry.name = name
+        if kept is not None and name:
+            try:
+                self.kept.rename(kept, name)
+            except InputError as error:
+                show_trouble(self.window(), trouble(error, "rename the kept render"))
+        self.session.renders_changed.emit()
 
     def _show_buttons(self) -> None:
         count = len(self.list.selectedItems())
@@ -286,15 +364,25 @@ class History(QWidget):
 
     def menu_of(self, item: QListWidgetItem) -> QMenu:
         """What can be done with a render."""
-        menu = QMenu(self)
+        menu, entry = QMenu(self), item.data(Qt.ItemDataRole.UserRole)
+        kept = self.kept.of(entry) is not None
         menu.setToolTipsVisible(True)
-        menu.addAction("Show", lambda: self.session.show(item.data(Qt.ItemDataRole.UserRole)))
-        menu.addAction("Rename", lambda: self.list.editItem(item)).setToolTip(NAMING)
-        keep = menu.addAction("Keep with the project", lambda: self.keep(item.data(Qt.ItemDataRole.UserRole)))
-        keep.setToolTip(KEEPING)
+        menu.addAction("Show" if isinstance(entry, Render) else "Open", lambda: self.show_entry(entry))
+        menu.addAction("Rename", lambda: self.list.editItem(item)).setToolTip("" if kept else NAMING)
+        if isinstance(entry, Render):
+            keep = "Keep again as it is now" if kept else "Keep with the project"
+            menu.addAction(keep, lambda: self.keep(entry)).setToolTip(KEEPING)
         compare = menu.addAction("Compare", self.compare)
         compare.setEnabled(len(self.list.selectedItems()) == 2)
-        render = item.data(Qt.ItemDataRole.UserRole)
-        menu.addAction("Copy as Python", lambda: copy_as_python(self.session, render))
-        menu.addAction("Delete", self.delete)
+        if isinstance(entry, Render):
+            menu.addAction("Copy as Python", lambda: copy_as_python(self.session, entry))
+        if isinstance(entry, Render) and kept:
+            menu.addAction("Close", lambda: self.forget([entry])).setToolTip(CLOSING)
+        menu.addAction("Remove from the project…" if kept else "Delete", self.delete)
         return menu
+
+
+def _removal(kept: Sequence[Kept]) -> str:
+    """Which files go, as it is asked."""
+    names = ", ".join(one.name for one in kept)
+    return f"{names}: light, settings and figures are taken off the disk, and nothing brings them back."

@@ -338,6 +338,7 @@ class RenderPanel(QWidget):
             self.session.add_render(self._render)
         else:
             self._render.frame = frame.carrying(self._render.frame)
+            self._render.kept = None  # what is with the project is of less light
             self.session.renders_changed.emit()
         self._figures.warn(frame.warnings)
 

@@ -73,20 +73,24 @@ def keep_render(session: Session, render: Render, name: str) -> Kept:
         raise InputError("the project has no folder of its own yet", cure="save it first")
     shown = as_kept(session, render, name)
     kept = keep(session.document.root, replace(shown, created=""), render.frame)
-    render.kept = True
+    render.kept = kept.folder
     session.message.emit("info", f"Kept {name} in {kept.folder}")
     return kept
 
 
 def open_render(session: Session, kept: Kept) -> Render:
-    """A kept one, in the history and shown. InputError: as of `open_kept`."""
+    """A kept one, in the history and shown; one that is there already is shown. InputError: as of `open_kept`."""
+    there = next((one for one in session.renders if kept.folder is not None and one.kept == kept.folder), None)
+    if there is not None:
+        session.show(there)
+        return there
     root = session.document.root
     frame = open_kept(kept, root)
     world = build_world(kept.project.scene, root, frame.step)
     number = max([render.number for render in session.renders], default=0) + 1
     render = Render(number, kept.project, world, frame, name=kept.name, created=read_out(kept.created))
     render.image_scale, render.final, render.stopped = kept.image_scale, not kept.stopped, kept.stopped
-    render.source, render.kept = session.project, True
+    render.source, render.kept = session.project, kept.folder
     session.add_render(render)
     return render
 
@@ -190,6 +194,7 @@ class RenderTable(QDialog):
         return found if found is not None and found.folder is not None else None
 
     def open_chosen(self) -> None:
+        """The kept render, which the table would lie over."""
         kept = self.chosen()
         if kept is None:
             return
@@ -197,6 +202,8 @@ class RenderTable(QDialog):
             open_render(self.session, kept)
         except InputError as error:
             show_trouble(self, trouble(error, f"open {kept.name}"))
+        else:
+            self.accept()
 
     def write(self, path: Path) -> None:
         """InputError: the file cannot be written."""

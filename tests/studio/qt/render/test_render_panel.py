@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -164,6 +165,7 @@ def test_a_render_that_was_kept_goes_on_from_where_it_was(qtbot, panel):
     (render,) = panel.session.renders
     samples = render.frame.quality_of("ambient").work
     assert panel.continue_button.isVisible() and render.state is not None
+    render.kept = Path("renders", "stopped")
     press(qtbot, panel.continue_button)
     qtbot.waitUntil(lambda: render.frame.quality_of("ambient").work > samples)
     assert render.frame.ambient is not None
@@ -171,6 +173,7 @@ def test_a_render_that_was_kept_goes_on_from_where_it_was(qtbot, panel):
     press(qtbot, panel.cancel_button)
     finish(qtbot, panel)
     assert panel.session.renders == [render] and panel.continue_button.isVisible()
+    assert render.kept is None, "the project's files have less of its light"
 
 
 def test_the_settings_are_edits_of_the_project_that_undo(qtbot, panel):

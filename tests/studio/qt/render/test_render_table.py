@@ -45,15 +45,17 @@ def test_a_render_is_kept_found_again_and_opened(qtbot: QtBot, tmp_path: Path) -
     assert not table.open_button.isEnabled()
     table.table.setCurrentCell(0, 2)
     assert table.open_button.isEnabled()
+    table.write(tmp_path / "table.csv")
+    assert (tmp_path / "table.csv").read_text().startswith(",Render 1,ten bits,ten bits")
+    del session.renders[1]
     table.open_button.click()
-    assert len(session.renders) == 3 and session.shown is session.renders[2]
+    assert not table.isVisible(), "it would lie over the render"
+    assert len(session.renders) == 2 and session.shown is session.renders[1]
     assert session.shown.name == "ten bits" and np.array_equal(
         session.shown.frame.laser_direct[0], frame.laser_direct[0]
     )
     assert session.shown.project.sensor.bits == 10
-    table.write(tmp_path / "table.csv")
-    assert (tmp_path / "table.csv").read_text().startswith(",Render 1,ten bits,ten bits")
-    table.close()
+    assert open_render(session, kept) is session.shown and len(session.renders) == 2
 
 
 def test_figures_stand_beside_the_settings_that_they_were_measured_with(qtbot: QtBot, tmp_path: Path) -> None:
@@ -77,6 +79,7 @@ def test_figures_stand_beside_the_settings_that_they_were_measured_with(qtbot: Q
     two = replace(shown, name="two", laser_power=(0.01,))
     assert any(row.cells == ("5 mW", "10 mW") for row in side_by_side([again, two]))
     # its light is that of the render: developed by the same settings the image is the same
+    session.renders.clear()
     opened = open_render(session, again)
     other = develop_again(opened.frame, development(opened.project, longer))
     assert np.array_equal(other[0].pixels, images[0].pixels) and opened.final
@@ -148,6 +151,7 @@ def test_a_render_that_was_stopped_is_opened_as_stopped(qtbot: QtBot, tmp_path: 
     render = Render(1, project, world, frame, final=False, stopped=True)
     session.add_render(render)
     keep_render(session, render, "half")
+    session.renders.clear()
     opened = open_render(session, kept_renders(tmp_path)[0][0])
     assert not opened.final and not opened.refining and as_kept(session, opened, "again").stopped
 

@@ -58,3 +58,12 @@ def test_a_field_is_found_by_a_few_letters_and_has_the_focus(window: MainWindow,
     qtbot.waitUntil(lambda: window.focusWidget() is field or field.isAncestorOf(window.focusWidget()))
     Section.folded = {}
     qtbot.waitUntil(field.isVisible)
+
+
+def test_what_removes_the_calibration_is_found_by_that_word(window: MainWindow, qtbot: QtBot) -> None:
+    search = CommandSearch(window)
+    qtbot.addWidget(search)
+    search.show_found("calibration")
+    texts = [search.list.item(i).text() for i in range(search.list.count())]
+    assert "Calibrate > Remove it from the project" in texts
+    assert "Calibrate > Use it in the project" in texts
