@@ -24,6 +24,7 @@ from render.output.tone_mapping import Picture, grey
 from render.plan import GroupQuality
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.session import Render, Session
 from studio.qt.image.compare_view import CompareView
 from studio.qt.render.python_copy import copy_as_python
@@ -287,7 +288,7 @@ class History(QWidget):
     def menu_of(self, item: QListWidgetItem) -> QMenu:
         """What can be done with a render."""
         menu = QMenu(self)
-        menu.setToolTipsVisible(True)
+        show_tips(menu)
         menu.addAction("Show", lambda: self.session.show(item.data(Qt.ItemDataRole.UserRole)))
         menu.addAction("Rename", lambda: self.list.editItem(item)).setToolTip(NAMING)
         keep = menu.addAction("Keep with the project", lambda: self.keep(item.data(Qt.ItemDataRole.UserRole)))

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QToolButton
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QToolButton, QToolTip
 from pytestqt.qtbot import QtBot
 
 from analysis.gauges.gauge import Gauge
@@ -17,6 +17,7 @@ from render.laser.laser import Waist
 from render.material.material import Texture
 from render.scene.motion import LinearStage
 from render.scene.shape import MeshFile
+from studio.project.calibration import CalibratedCamera, Calibration
 from studio.qt.core.session import Session
 from studio.qt.scene import mesh_importer
 from studio.qt.scene.inspector import Inspector
@@ -207,6 +208,38 @@ class TestMenus:
         assert "Typical" in told[-1]
         session.document.undo()
         assert session.project == before
+
+    def test_a_preset_that_is_refused_is_told_as_such_with_the_way_out(
+        self, session: Session, inspector: Inspector
+    ) -> None:
+        """Its description followed the refusal at once, as if it were applied."""
+        camera = session.project.scene.camera
+        own = CalibratedCamera(**{name: getattr(camera, name) for name in ("width", "height", "fx", "fy", "cx", "cy")})
+        session.set(("calibration",), Calibration(camera=own))
+        session.select(("sensor",))
+        before, told = session.project, []
+        session.message.connect(lambda level, text: told.append((level, text)))
+        action = next(entry for entry in inspector.presets.menu().actions() if "IMX174" in entry.text())
+        action.trigger()
+        assert session.project is before and [level for level, _ in told] == ["error"]
+        assert told[0][1] == (
+            f"{action.text()} is not taken, nothing has changed: the project's calibration is of a camera of "
+            f"{camera.width} x {camera.height} px, and this one has 1920 x 1200 px: "
+            "Calibrate > Remove it from the project, or calibrate anew"
+        )
+
+    def test_the_tip_of_a_preset_goes_with_its_menu(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
+        """It stayed over the camera's view for seconds."""
+        session.select(("sensor",))
+        menu = inspector.presets.menu()
+        menu.popup(inspector.mapToGlobal(QPoint(20, 20)))
+        place = menu.actionGeometry(menu.actions()[0]).center()
+        qtbot.mouseMove(menu, place + QPoint(3, 0))
+        qtbot.mouseMove(menu, place)
+        qtbot.waitUntil(QToolTip.isVisible)
+        qtbot.keyClick(menu, Qt.Key.Key_Escape)
+        qtbot.waitUntil(lambda: not QToolTip.isVisible())
+        assert not menu.toolTipsVisible(), "nor does one come that was waited for"
 
     def test_only_items_with_presets_have_the_menu(self, session: Session, inspector: Inspector) -> None:
         items = (LASER, CAMERA, ("sensor",), ("scene", "objects", 0), ("scene", "motion"), ())
