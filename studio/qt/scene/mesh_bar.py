@@ -69,7 +69,7 @@ class MeshBar(QWidget):
         column.addWidget(self.told)
         self.replace.clicked.connect(lambda: replace_mesh(session, self))
         self.fit.clicked.connect(self._fit)
-        self.ground.clicked.connect(lambda: self._place("put on the ground", mesh_placing.on_ground))
+        self.ground.clicked.connect(self._put_down)
         live(session).changed.connect(self.refresh)
         session.selection_changed.connect(self.refresh)
         session.project_changed.connect(self.refresh)
@@ -83,6 +83,8 @@ class MeshBar(QWidget):
             return
         vertices = self._vertices(item)
         for button in (self.up, self.fit, self.ground):
+            if vertices is None and button.hasFocus():
+                self.setFocus()  # Qt would give it to the next field, and keys of the 3D view would be typed there
             button.setEnabled(vertices is not None)
         axis = mesh_placing.up_axis(item)
         self.up.setText(f"{axis or 'Which'} is up")
@@ -115,17 +117,32 @@ class MeshBar(QWidget):
         sizes = " became ".join(f"{length.factor * size:.4g} {length.shown}" for size in (before, by * before))
         self.session.message.emit("info", f"{now.name} is scaled by {by:.3g}: {sizes}; Ctrl+Z takes it back")
 
-    def _place(self, label: str, change: Callable[[SceneObject, Float], SceneObject]) -> None:
+    def _put_down(self) -> None:
+        """How far it moved is said, or that it stood there."""
+        before = selected_mesh(self.session)
+        if before is None or not self._place("put on the ground", mesh_placing.on_ground):
+            return
+        now = selected_mesh(self.session) or before
+        by = now.T_world_object.translation[2] - before.T_world_object.translation[2]
+        told = f"{now.name} stood on the ground already: its lowest point is at height zero"
+        if by != 0.0:
+            far = f"{1e3 * abs(by):.4g} mm {'up' if by > 0.0 else 'down'}"
+            told = f"{now.name} moved {far}, its lowest point to height zero; Ctrl+Z takes it back"
+        self.session.message.emit("info", told)
+
+    def _place(self, label: str, change: Callable[[SceneObject, Float], SceneObject]) -> bool:
+        """False: it cannot be done, which is told where there is something to tell."""
         item, session = selected_mesh(self.session), self.session
         vertices = None if item is None else self._vertices(item)
         if item is None or vertices is None:
-            return
+            return False
         try:
             project = replaced(session.project, session.selection[:3], change(item, vertices))
         except InputError as error:
             session.message.emit("error", str(error))
-        else:
-            session.document.apply(f"{label}: {item.name}", project)
+            return False
+        session.document.apply(f"{label}: {item.name}", project)
+        return True
 
     def _met(self, item: SceneObject) -> str:
         """Names of what it may stand in."""

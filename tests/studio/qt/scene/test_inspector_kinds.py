@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QToolButton, QToolTip
+from PySide6.QtWidgets import QApplication, QLineEdit, QToolButton, QToolTip
 from pytestqt.qtbot import QtBot
 
 from analysis.gauges.gauge import Gauge
@@ -123,9 +123,15 @@ class TestKinds:
         assert f"May stand in {floor}: their boxes overlap" in bar.told.text()
         bar.axes["-x"].trigger()
         qtbot.waitUntil(lambda: bar.ground.isEnabled() and bar.up.text().startswith("-x"))
-        qtbot.mouseClick(bar.ground, Qt.MouseButton.LeftButton)
+        said: list[str] = []
+        session.message.connect(lambda level, text: said.append(text))
+        height = session.project.scene.objects[1].T_world_object.translation[2]
+        for _ in range(2):
+            qtbot.mouseClick(bar.ground, Qt.MouseButton.LeftButton)
         placed = session.project.scene.objects[1]
         assert placed.T_world_object.translation[2] == pytest.approx(0.05, abs=1e-9)
+        moved = f"moved {1e3 * abs(0.05 - height):.4g} mm {'up' if height < 0.05 else 'down'}"
+        assert moved in said[-2] and "stood on the ground already" in said[-1]
         qtbot.waitUntil(lambda: "May stand in" not in bar.told.text())
         # of another unit it stands where it stood, and one undo takes unit and place back
         unit = field(inspector, "scene", "objects", 1, "shape", "unit")
@@ -155,6 +161,7 @@ class TestKinds:
         qtbot.waitUntil(lambda: bar.fit.isEnabled() and bar.told.text().startswith("100 x 50 x 20 mm"))
         session.message.connect(lambda level, text: told.append((level, text)))
         qtbot.mouseClick(bar.fit, Qt.MouseButton.LeftButton)
+        assert not isinstance(QApplication.focusWidget(), QLineEdit), "no key is typed into the next field"
         by = session.project.scene.objects[1].scale / before.scale
         expected = f"{before.name} is scaled by {by:.3g}: 100 mm became {100 * by:.4g} mm; Ctrl+Z takes it back"
         assert by != 1.0 and told == [("info", expected)]
