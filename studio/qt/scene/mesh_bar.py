@@ -17,6 +17,7 @@ from render.scene.shape import UNITS, MeshFile
 from studio.editing import mesh_placing
 from studio.editing.scene_edits import OBJECTS, replace_mesh_of
 from studio.editing.units import Unit
+from studio.preview.inside import CURE, inside
 from studio.project.document import FieldPath, replaced, value_at
 from studio.project.mesh_import import ImportedMesh
 from studio.project.project import Project
@@ -95,8 +96,9 @@ class MeshBar(QWidget):
         else:
             sides = vertices.max(axis=0) - vertices.min(axis=0)
             size = " x ".join(f"{1e3 * side:.4g}" for side in sides) + " mm along x, y, z of the file"
-            inside = self._met(item)
-            self.told.setText(f"{size}. May stand in {inside}: their boxes overlap." if inside else size)
+            met = self._met(item)
+            may = f". May stand in {met}: their boxes overlap." if met else ""
+            self.told.setText(f"{size}{may}{self._around(item)}")
 
     def _turn_up(self, axis: mesh_placing.UpAxis) -> None:
         def turned(item: SceneObject, vertices: Float) -> SceneObject:
@@ -152,6 +154,15 @@ class MeshBar(QWidget):
         boxes = [(one.body.bounds, one.T_world_object) for one in look.placed]
         names = [visible[k].name for k in mesh_placing.meeting(boxes, index)]
         return ", ".join(names[:2]) + (f" and {len(names) - 2} more" if len(names) > 2 else "")
+
+    def _around(self, item: SceneObject) -> str:
+        """That camera or lasers are in it, as a sentence; empty: they are not."""
+        look = live(self.session).look
+        for one in inside(look):
+            if _size(look.scene.visible_objects[one.index]) == _size(item):
+                told = one.of("it")
+                return f"\n{told[0].upper()}{told[1:]}; {CURE}"
+        return ""
 
     def after_edit(self, owner: FieldPath, before: Project, after: Project) -> Project:
         """In another unit a part stands where it stood: about an origin elsewhere it would vanish below its table."""
