@@ -30,6 +30,7 @@ from render.world.material_checks import check_materials, scene_warnings
 from render.world.placement_checks import check_placement
 from render.world.world import build_world
 from studio.preview.estimates import ambient_electrons, line_pixels, line_width_px
+from studio.preview.inside import inside
 from studio.preview.preview import Look, Preview
 from studio.preview.saturation import saturated_rows
 from studio.project.project import Project
@@ -136,7 +137,11 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
         frames=scene.frame_count,
         full_well=project.sensor.full_well,
         lasers=views,
-        warnings=(*_warnings(project, views), *scene_warnings(world, scene)),
+        warnings=(
+            *_warnings(project, views),
+            *scene_warnings(world, scene),
+            *(one.told for one in inside(look) if one.enclosed),
+        ),
         plan=expected_plan(scene, project.render).with_steps("indirect", frame.plan.of("indirect")),
     )
 

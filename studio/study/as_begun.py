@@ -79,13 +79,13 @@ def told_apart(apart: tuple[str, ...]) -> str:
 
 def _told(change: Change) -> str:
     """Of long lists, as those of a calibration, only whether there is one."""
-    there, now = ("one" if _is_long(value) else value for value in (change.a, change.b))
+    there, now = ("one" if is_long(value) else value for value in (change.a, change.b))
     if there == now == "one":
         return f"{change.label}: another one in the folder"
     return f"{change.label}: {there} in the folder, {'there is one' if now == 'one' else now} now"
 
 
-def _is_long(value: str) -> bool:
+def is_long(value: str) -> bool:
     return value.startswith(("[", "{")) and len(value) > LONGEST
 
 

@@ -26,7 +26,7 @@ from studio.qt.calibrate.view_table import ViewTable
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.jobs import JobRunner, time_left
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import ElidedLabel, ShareBar, text_button
+from studio.qt.core.widgets import ElidedLabel, ShareBar, breakable, text_button
 from studio.qt.forms.unit_box import UnitBox
 from studio.runtime.jobs import Job, State
 
@@ -137,7 +137,7 @@ class CalibratePanel(QWidget):
         self.source.setText(work.source or "nothing yet")
         self.views.setVisible(there)
         self.empty.setVisible(not there)
-        self.problem.setText(work.problem)
+        self.problem.setText(breakable(work.problem))
         self.problem.setVisible(bool(work.problem))
         for widget in (self.bar, self.stage, self.stop):
             widget.setVisible(work.running)

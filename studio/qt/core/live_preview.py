@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from render.base.threads import Cancel
 from render.scene.scene import SceneObject
+from studio.preview.inside import inside
 from studio.preview.preview import Look, Preview
 from studio.preview.problem_fields import problem_fields
 from studio.qt.core.jobs import JobRunner
@@ -42,6 +43,7 @@ class Live(QObject):
         self._runner = JobRunner(self)
         self._runner.failed.connect(self._load_failed)
         self._told: set[str] = set()
+        self._inside: set[str] = set()
         self.ready = False
         """The kernels are compiled. Until then looks are empty, so that the window never waits for a compiler."""
         self._timer = QTimer(self, singleShot=True, interval=0)
@@ -96,7 +98,16 @@ class Live(QObject):
                 self._told.add(str(error))
                 session.message.emit("error", str(error))
         session.tell_problems(problem_fields(look, self.preview.errors))
+        self._tell_inside(look)
         return look
+
+    def _tell_inside(self, look: Look) -> None:
+        """Camera or lasers that a mesh is around by now, and was not."""
+        found = {one.told for one in inside(look) if one.enclosed}
+        for told in found - self._inside:
+            self.session.message.emit("warning", told)
+        whole = len(look.placed) == len(look.scene.visible_objects)
+        self._inside = found if whole else self._inside | found
 
     def _load_missing(self) -> None:
         session, preview, ready = self.session, self.preview, self.ready
@@ -135,5 +146,6 @@ class Live(QObject):
     def _start_anew(self) -> None:
         self.preview = Preview()
         self._told.clear()
+        self._inside.clear()
         self.session.tell_problems({})
         self._timer.start()

@@ -21,6 +21,7 @@ from render.checkpoint import RenderState
 from render.frame import Frame
 from render.sensor.develop import Image
 from render.world.world import World
+from studio.editing.refusals import refusal
 from studio.project.document import Document, FieldPath, value_at
 from studio.project.project import Project
 from studio.scan.redevelop import Development, is_stale
@@ -277,8 +278,7 @@ class Session(QObject):
         self.document.listeners.clear()
         self.document = document
         document.listeners.append(self.project_changed.emit)
-        self.selection, self.hovered, self.step, self.renders, self.shown = (), None, 0, [], None
-        self._others = ()
+        self.selection, self._others, self.hovered, self.step, self.renders, self.shown = (), (), None, 0, [], None
         self.document_replaced.emit()
         self.project_changed.emit()
         self.selection_changed.emit()
@@ -345,7 +345,7 @@ class Session(QObject):
         try:
             self.document.set(path, value, label, merge)
         except InputError as error:
-            self.message.emit("error", str(error))
+            self.message.emit("error", refusal(error))
             return False
         return True
 

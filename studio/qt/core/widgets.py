@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from PySide6.QtCore import QEvent, QMargins, QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import (
@@ -17,6 +19,8 @@ from PySide6.QtWidgets import (
 )
 
 THOUSANDTHS = 1000
+LONG_WORD = 30
+"""Characters, more than a board or a number with its unit that a person may copy."""
 FRAME = QMargins(2, 32, 2, 2)
 """px of the screen that a title bar and borders take, about."""
 
@@ -158,3 +162,12 @@ def spring() -> QWidget:
     made = QWidget()
     made.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
     return made
+
+
+def breakable(text: str) -> str:
+    """The text with places in its longest words, after colons and slashes, where a label may break its lines."""
+    return re.sub(rf"\S{{{LONG_WORD},}}", _with_breaks, text)
+
+
+def _with_breaks(word: re.Match[str]) -> str:
+    return re.sub(r"([:/\\])(?=.)", "\\1\u200b", word[0])

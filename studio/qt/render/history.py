@@ -27,6 +27,7 @@ from render.plan import GroupQuality
 from studio.qt.core import theme
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.dialogs import ask_removal, show_trouble
+from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.session import Render, Session
 from studio.qt.image.compare_view import CompareView
 from studio.qt.render.kept_list import MARK, Entry, KeptList, kept_lines, kept_tip, place_holder
@@ -366,7 +367,7 @@ class History(QWidget):
         """What can be done with a render."""
         menu, entry = QMenu(self), item.data(Qt.ItemDataRole.UserRole)
         kept = self.kept.of(entry) is not None
-        menu.setToolTipsVisible(True)
+        show_tips(menu)
         menu.addAction("Show" if isinstance(entry, Render) else "Open", lambda: self.show_entry(entry))
         menu.addAction("Rename", lambda: self.list.editItem(item)).setToolTip("" if kept else NAMING)
         if isinstance(entry, Render):

@@ -32,6 +32,7 @@ from studio.qt.core.open_file import open_file
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.core.step_bar import StepBar
+from studio.qt.render.resuming import ask_resume, told_before_resuming
 from studio.runtime.console import FRAMES, frame_of
 from studio.runtime.jobs import Job, Progress
 from studio.scan.options import Listener, ScanOptions
@@ -87,8 +88,11 @@ class MotionPanel(QWidget):
         self.run.setToolTip("Render and measure every step, into a folder, with points and report")
         self.run.clicked.connect(lambda: self.ask_and_run())
         self.go_on = QPushButton("Resume")
-        self.go_on.clicked.connect(self.resume)
+        self.go_on.clicked.connect(self.ask_and_resume)
         self.go_on.hide()
+        self.other = QLabel(wordWrap=True)
+        self.other.setObjectName("warning")
+        self.other.hide()
         self.stopped: Order | None = None
         """The scan that was cancelled, or failed, before its end."""
         self._running: tuple[Job[ScanResult], Order] | None = None
@@ -113,6 +117,7 @@ class MotionPanel(QWidget):
         if self.session.step >= scene.frame_count:
             self.session.look_at_step(scene.frame_count - 1)
         self._follow_step()
+        self._tell_scan()
 
     def ask_and_run(self) -> None:
         """Ask for the folder of the results, then run the scan; while something is rendered, nothing is asked."""
@@ -132,6 +137,17 @@ class MotionPanel(QWidget):
         session, scale = self.session, SCALES[self.scale.currentText()]
         order = Order(session.document, session.project, session.document.root, folder, scale, report)
         return self._start(order, resume=is_unfinished(folder, scaled(order.project, scale)))
+
+    def ask_and_resume(self) -> None:
+        """Go on with the scan that was stopped; where the project is another by now, a person is asked first."""
+        if self.stopped is None or self._is_busy():
+            return
+        told = told_before_resuming(self.stopped.project, self.session.project)
+        answer = ask_resume(self, str(self.stopped.folder), told) if told else "resume"
+        if answer == "resume":
+            self.resume()
+        elif answer == "anew":
+            self.ask_and_run()
 
     def resume(self) -> Job[ScanResult] | None:
         """Go on with the scan that was stopped, as it was asked for, whatever has changed in the project since."""
@@ -187,6 +203,7 @@ class MotionPanel(QWidget):
         job = self.runner.run(RENDER, "scan", work, lambda result: self._done(result, order))
         job.there = share(FRAMES, there / count) or 0.0 if there else 0.0
         self._running = job, order
+        self._tell_scan()
         return job
 
     def _grow(self, order: Order, points: Cloud) -> None:
@@ -196,6 +213,7 @@ class MotionPanel(QWidget):
 
     def _done(self, result: ScanResult, order: Order) -> None:
         self._running = None
+        self._tell_scan()
         self.session.message.emit("info", f"The scan is done: {result.folder}")
         if self.session.document is not order.document:
             return
@@ -218,15 +236,24 @@ class MotionPanel(QWidget):
         order, self._running = self._running[1], None
         if order.document is self.session.document:
             self.stopped = order
-            size = next((name for name, scale in SCALES.items() if scale == order.image_scale), "")
-            self.go_on.setText(f"Resume ({size})")
-            self.go_on.setToolTip(
-                f"Go on at {size}, as it began, whatever is chosen now, where the scan into {order.folder} was stopped"
-            )
+            self._tell_scan()
             self.go_on.show()
             self.stopped_changed.emit()
-            told = f"The scan was stopped; Render > Resume the scan goes on at {size}: {order.folder}"
+            told = f"The scan was stopped; Render > Resume the scan goes on at {size_of(order)}: {order.folder}"
             self.session.message.emit("info", told)
+
+    def _tell_scan(self) -> None:
+        """In what the project is another by now than the scan that was stopped, or that is under way."""
+        order = self.stopped or (self._running[1] if self._running is not None else None)
+        ours = order is not None and order.document is self.session.document
+        other = told_before_resuming(order.project, self.session.project) if order is not None and ours else ""
+        self.other.setText(f"{'Resume' if self.stopped is not None else 'The scan under way'} {other}")
+        self.other.setVisible(bool(other))
+        if self.stopped is not None:
+            size, place = size_of(self.stopped), self.stopped.folder
+            self.go_on.setText(f"Resume ({size})")
+            tip = f"Go on at {size}, as it began, whatever is chosen now, where the scan into {place} was stopped"
+            self.go_on.setToolTip("\n".join(filter(None, (tip, other))))
 
     def _forget(self) -> None:
         """Another project was opened: what was scanned of the one before goes."""
@@ -234,6 +261,7 @@ class MotionPanel(QWidget):
         self.stopped_changed.emit()
         for button in (self.open, self.go_on):
             button.hide()
+        self._tell_scan()
 
     def _open_report(self) -> None:
         if self.report is not None:
@@ -272,11 +300,17 @@ class MotionPanel(QWidget):
             bottom.addWidget(widget)
         inside.addWidget(self.steps)
         inside.addWidget(self.told)
+        inside.addWidget(self.other)
         inside.addLayout(bottom)
         inside.addStretch(1)
         self.stack = QStackedLayout(self)
         self.stack.addWidget(still)
         self.stack.addWidget(moving)
+
+
+def size_of(order: Order) -> str:
+    """The name of a scan's size."""
+    return next((name for name, scale in SCALES.items() if scale == order.image_scale), "")
 
 
 def frames_there(folder: Path, count: int) -> int:

@@ -28,6 +28,7 @@ from studio.project.same_lasers import same_lasers
 from studio.qt.core import theme
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.delete_key import DeleteKey
+from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import keep_room, text_button
 from studio.qt.results.measures_table import ReadOnlyTable
@@ -357,7 +358,7 @@ class PartTab(QWidget):
 
     def _lay_out(self) -> None:
         menu = QMenu(self.add)
-        menu.setToolTipsVisible(True)
+        show_tips(menu)
         for kind, title in TITLES.items():
             asked = menu.addAction(title)
             asked.setToolTip(DEFINITIONS.get(kind, ""))
@@ -384,7 +385,6 @@ class PartTab(QWidget):
         column.addWidget(self.told)
         column.addWidget(self.table, 1)
         column.addWidget(self.editor)
-        column.addStretch(0)
 
     def _start_asked(self, kind: Kind, _checked: bool = False) -> None:
         self.start(kind)

@@ -17,6 +17,7 @@ from render.scene.shape import UNITS, MeshFile
 from studio.editing import mesh_placing
 from studio.editing.scene_edits import OBJECTS, replace_mesh_of
 from studio.editing.units import Unit
+from studio.preview.inside import CURE, inside
 from studio.project.document import FieldPath, replaced, value_at
 from studio.project.mesh_import import ImportedMesh
 from studio.project.project import Project
@@ -69,7 +70,7 @@ class MeshBar(QWidget):
         column.addWidget(self.told)
         self.replace.clicked.connect(lambda: replace_mesh(session, self))
         self.fit.clicked.connect(self._fit)
-        self.ground.clicked.connect(lambda: self._place("put on the ground", mesh_placing.on_ground))
+        self.ground.clicked.connect(self._put_down)
         live(session).changed.connect(self.refresh)
         session.selection_changed.connect(self.refresh)
         session.project_changed.connect(self.refresh)
@@ -83,6 +84,8 @@ class MeshBar(QWidget):
             return
         vertices = self._vertices(item)
         for button in (self.up, self.fit, self.ground):
+            if vertices is None and button.hasFocus():
+                self.setFocus()  # Qt would give it to the next field, and keys of the 3D view would be typed there
             button.setEnabled(vertices is not None)
         axis = mesh_placing.up_axis(item)
         self.up.setText(f"{axis or 'Which'} is up")
@@ -93,8 +96,9 @@ class MeshBar(QWidget):
         else:
             sides = vertices.max(axis=0) - vertices.min(axis=0)
             size = " x ".join(f"{1e3 * side:.4g}" for side in sides) + " mm along x, y, z of the file"
-            inside = self._met(item)
-            self.told.setText(f"{size}. May stand in {inside}: their boxes overlap." if inside else size)
+            met = self._met(item)
+            may = f". May stand in {met}: their boxes overlap." if met else ""
+            self.told.setText(f"{size}{may}{self._around(item)}")
 
     def _turn_up(self, axis: mesh_placing.UpAxis) -> None:
         def turned(item: SceneObject, vertices: Float) -> SceneObject:
@@ -115,17 +119,32 @@ class MeshBar(QWidget):
         sizes = " became ".join(f"{length.factor * size:.4g} {length.shown}" for size in (before, by * before))
         self.session.message.emit("info", f"{now.name} is scaled by {by:.3g}: {sizes}; Ctrl+Z takes it back")
 
-    def _place(self, label: str, change: Callable[[SceneObject, Float], SceneObject]) -> None:
+    def _put_down(self) -> None:
+        """How far it moved is said, or that it stood there."""
+        before = selected_mesh(self.session)
+        if before is None or not self._place("put on the ground", mesh_placing.on_ground):
+            return
+        now = selected_mesh(self.session) or before
+        by = now.T_world_object.translation[2] - before.T_world_object.translation[2]
+        told = f"{now.name} stood on the ground already: its lowest point is at height zero"
+        if by != 0.0:
+            far = f"{1e3 * abs(by):.4g} mm {'up' if by > 0.0 else 'down'}"
+            told = f"{now.name} moved {far}, its lowest point to height zero; Ctrl+Z takes it back"
+        self.session.message.emit("info", told)
+
+    def _place(self, label: str, change: Callable[[SceneObject, Float], SceneObject]) -> bool:
+        """False: it cannot be done, which is told where there is something to tell."""
         item, session = selected_mesh(self.session), self.session
         vertices = None if item is None else self._vertices(item)
         if item is None or vertices is None:
-            return
+            return False
         try:
             project = replaced(session.project, session.selection[:3], change(item, vertices))
         except InputError as error:
             session.message.emit("error", str(error))
-        else:
-            session.document.apply(f"{label}: {item.name}", project)
+            return False
+        session.document.apply(f"{label}: {item.name}", project)
+        return True
 
     def _met(self, item: SceneObject) -> str:
         """Names of what it may stand in."""
@@ -135,6 +154,15 @@ class MeshBar(QWidget):
         boxes = [(one.body.bounds, one.T_world_object) for one in look.placed]
         names = [visible[k].name for k in mesh_placing.meeting(boxes, index)]
         return ", ".join(names[:2]) + (f" and {len(names) - 2} more" if len(names) > 2 else "")
+
+    def _around(self, item: SceneObject) -> str:
+        """That camera or lasers are in it, as a sentence; empty: they are not."""
+        look = live(self.session).look
+        for one in inside(look):
+            if _size(look.scene.visible_objects[one.index]) == _size(item):
+                told = one.of("it")
+                return f"\n{told[0].upper()}{told[1:]}; {CURE}"
+        return ""
 
     def after_edit(self, owner: FieldPath, before: Project, after: Project) -> Project:
         """In another unit a part stands where it stood: about an origin elsewhere it would vanish below its table."""

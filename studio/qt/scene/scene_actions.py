@@ -16,8 +16,10 @@ from render.scene.shape import Box, Cylinder, Plane, Sphere, StepBlock, VGroove,
 from studio.editing import scene_edits
 from studio.editing.forms import kind_label
 from studio.editing.presets import Preset, presets_for, with_preset
+from studio.editing.refusals import refusal
 from studio.project.document import FieldPath, value_at
 from studio.project.project import Project
+from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.session import Session
 from studio.qt.scene.mesh_importer import choose_meshes
 from studio.qt.scene.scene_icons import scene_icon
@@ -27,12 +29,15 @@ MOTIONS = (NoMotion, LinearStage, Turntable, PoseList)
 Edit = Callable[[Project], scene_edits.Result]
 
 
-def apply(session: Session, label: str, edit: Edit) -> bool:
-    """Make an edit current and select what it made; a refusal is told, changes nothing and is False."""
+def apply(session: Session, label: str, edit: Edit, told: str = "") -> bool:
+    """Make an edit current and select what it made; a refusal is told, changes nothing and is False.
+
+    told: what begins the words of a refusal.
+    """
     try:
         project, path = edit(session.project)
     except InputError as error:
-        session.message.emit("error", str(error))
+        session.message.emit("error", f"{told}{refusal(error)}")
         return False
     session.document.apply(label, project)
     session.select(path)
@@ -129,14 +134,18 @@ def fill_motion_menu(menu: QMenu, session: Session) -> None:
 
 def fill_presets_menu(menu: QMenu, session: Session) -> None:
     """Presets for the selection, or one entry that says that there are none."""
-    menu.setToolTipsVisible(True)
+    show_tips(menu)
     path = session.selection
     found = presets_for(session.project, path) if _exists(session) else ()
     for preset in found:
 
         def use(preset: Preset = preset) -> None:
-            apply(session, f"preset {preset.name}", lambda project: (with_preset(project, path, preset), path))
-            session.message.emit("info", f"{preset.name}. {preset.source}")
+            def edit(project: Project) -> scene_edits.Result:
+                return with_preset(project, path, preset), path
+
+            refused = f"{preset.name} is not taken, nothing has changed: "
+            if apply(session, f"preset {preset.name}", edit, refused):
+                session.message.emit("info", f"{preset.name}. {preset.source}")
 
         # rich text, so that a tool tip breaks its lines
         _entry(menu, preset.name, "", use).setToolTip(f"<p>{preset.source}</p>")

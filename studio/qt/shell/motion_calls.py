@@ -27,6 +27,6 @@ def join_motion(panels: Panels, commands: Actions, call_panel: Callable[[str], N
 
     tree.motion_clicked.connect(call(lambda: None))
     commands.connect("scan", call(motion.ask_and_run))
-    commands.connect("resume_scan", call(motion.resume))
+    commands.connect("resume_scan", call(motion.ask_and_resume))
     motion.stopped_changed.connect(allow)
     allow()

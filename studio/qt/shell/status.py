@@ -113,6 +113,11 @@ class StatusBar(QStatusBar):
         self._say(text, level if level in ("warning", "error") else "message")
         self._fade.start(1000 * MESSAGE_SECONDS.get(level, 8))
 
+    def drop_tip(self) -> None:
+        """What the mouse rests on is no longer what is spoken of: a key has brought another workspace."""
+        self.tip = ""
+        self._place_whole()
+
     def _say(self, text: str, name: str) -> None:
         line = text.splitlines()[0] if text else ""
         self.tip = "" if line else self.tip

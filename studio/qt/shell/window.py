@@ -134,6 +134,7 @@ class MainWindow(QMainWindow):
         self.commands[SWITCH[wanted.key]].setChecked(True)
         self.panels.when_made("viewport", self._pin)
         self.preferences.change(workspace=wanted.key)
+        self.status.drop_tip()
 
     def rearrange(self) -> None:
         """The panels of this workspace back where they belong."""

@@ -12,7 +12,15 @@ from typing import Any, Protocol
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QEnterEvent, QKeyEvent, QMouseEvent, QWheelEvent
-from PySide6.QtWidgets import QAbstractItemView, QApplication, QWidget
+from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QApplication,
+    QComboBox,
+    QLineEdit,
+    QPlainTextEdit,
+    QTextEdit,
+    QWidget,
+)
 from pyvistaqt import QtInteractor
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
@@ -175,8 +183,8 @@ class View3D(QtInteractor):  # type: ignore[misc]
         event.accept()
 
     def enterEvent(self, event: QEnterEvent) -> None:
-        # its keys are for what the mouse is over, as in Blender; a list or a tree would take G or R for a name
-        if isinstance(QApplication.focusWidget(), QAbstractItemView):
+        # its keys are for what the mouse is over, as in Blender, but in what is being typed they are letters
+        if not _takes_text(self.window().focusWidget()):
             self.setFocus(Qt.FocusReason.MouseFocusReason)
         event.accept()
 
@@ -232,6 +240,11 @@ class View3D(QtInteractor):  # type: ignore[misc]
             return eye
         factor = np.tan(np.radians(eye.angle / 2)) / np.tan(np.radians(ANGLE / 2))
         return replace(eye, distance=eye.distance * float(factor), angle=ANGLE)
+
+
+def _takes_text(widget: QWidget | None) -> bool:
+    typed = isinstance(widget, QLineEdit | QAbstractSpinBox | QTextEdit | QPlainTextEdit) and not widget.isReadOnly()
+    return typed or (isinstance(widget, QComboBox) and widget.isEditable())
 
 
 def _turn(step: QPointF) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from studio.calibration import material
+from studio.calibration.board_text import FORM
 from studio.calibration.exchange import read_camera
 from studio.qt.calibrate.board_view import COVERAGE, DEPTH, NEXT, RESIDUALS, TABS
 from studio.qt.calibrate.calibrate_panel import NARROWEST
@@ -204,6 +205,13 @@ class TestPictures:
         settled(qtbot, solved)
         assert "farthest distance is not beyond the nearest" in solved.panel.problem.text()
         assert "--" not in solved.panel.problem.text()
+
+    def test_how_a_board_is_written_is_told_within_the_narrowest_panel(self, solved: Desk) -> None:
+        """There stood "…MARKER[:DICTIONARY" and the rest was cut off."""
+        panel = solved.panel
+        solved.work.tell(FORM)
+        assert "MARKER" in panel.problem.text()
+        assert panel.problem.minimumSizeHint().width() <= NARROWEST - 20
 
     def test_coverage_counts_the_parts_of_the_image_that_have_corners(self, solved: Desk) -> None:
         solved.boards.tabs.setCurrentIndex(COVERAGE)

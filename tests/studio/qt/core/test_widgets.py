@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLabel, QMainWindow, QPushButton, QVBoxLayout, QWi
 from pytestqt.qtbot import QtBot
 
 from studio.qt.core.boxes import DecimalBox
-from studio.qt.core.widgets import Scrolled, ShareBar, bring_into_view
+from studio.qt.core.widgets import Scrolled, ShareBar, breakable, bring_into_view
 
 
 def test_a_button_that_is_scrolled_away_is_brought_back(qtbot: QtBot) -> None:
@@ -89,3 +89,10 @@ def test_undo_is_the_window_s_unless_a_number_is_being_typed(qtbot: QtBot) -> No
     qtbot.keyClick(box, Qt.Key.Key_Return)
     qtbot.keyClick(box, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert undone == [5.0] and box.value() == 5.0
+
+
+def test_only_long_words_are_broken_and_what_a_person_copies_is_as_it_was() -> None:
+    plain = "a board as charuco:14x10:25mm:18mm, at 1/2"
+    assert breakable(plain) == plain
+    form = "charuco:COLUMNSxROWS:SIDE:MARKER[:DICTIONARY]"
+    assert breakable(f"as {form}").count("\u200b") == 4 and breakable(form).replace("\u200b", "") == form

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QToolButton
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QApplication, QLineEdit, QToolButton, QToolTip
 from pytestqt.qtbot import QtBot
 
 from analysis.gauges.gauge import Gauge
@@ -17,6 +17,7 @@ from render.laser.laser import Waist
 from render.material.material import Texture
 from render.scene.motion import LinearStage
 from render.scene.shape import MeshFile
+from studio.project.calibration import CalibratedCamera, Calibration
 from studio.qt.core.session import Session
 from studio.qt.scene import mesh_importer
 from studio.qt.scene.inspector import Inspector
@@ -122,9 +123,15 @@ class TestKinds:
         assert f"May stand in {floor}: their boxes overlap" in bar.told.text()
         bar.axes["-x"].trigger()
         qtbot.waitUntil(lambda: bar.ground.isEnabled() and bar.up.text().startswith("-x"))
-        qtbot.mouseClick(bar.ground, Qt.MouseButton.LeftButton)
+        said: list[str] = []
+        session.message.connect(lambda level, text: said.append(text))
+        height = session.project.scene.objects[1].T_world_object.translation[2]
+        for _ in range(2):
+            qtbot.mouseClick(bar.ground, Qt.MouseButton.LeftButton)
         placed = session.project.scene.objects[1]
         assert placed.T_world_object.translation[2] == pytest.approx(0.05, abs=1e-9)
+        moved = f"moved {1e3 * abs(0.05 - height):.4g} mm {'up' if height < 0.05 else 'down'}"
+        assert moved in said[-2] and "stood on the ground already" in said[-1]
         qtbot.waitUntil(lambda: "May stand in" not in bar.told.text())
         # of another unit it stands where it stood, and one undo takes unit and place back
         unit = field(inspector, "scene", "objects", 1, "shape", "unit")
@@ -154,6 +161,7 @@ class TestKinds:
         qtbot.waitUntil(lambda: bar.fit.isEnabled() and bar.told.text().startswith("100 x 50 x 20 mm"))
         session.message.connect(lambda level, text: told.append((level, text)))
         qtbot.mouseClick(bar.fit, Qt.MouseButton.LeftButton)
+        assert not isinstance(QApplication.focusWidget(), QLineEdit), "no key is typed into the next field"
         by = session.project.scene.objects[1].scale / before.scale
         expected = f"{before.name} is scaled by {by:.3g}: 100 mm became {100 * by:.4g} mm; Ctrl+Z takes it back"
         assert by != 1.0 and told == [("info", expected)]
@@ -207,6 +215,38 @@ class TestMenus:
         assert "Typical" in told[-1]
         session.document.undo()
         assert session.project == before
+
+    def test_a_preset_that_is_refused_is_told_as_such_with_the_way_out(
+        self, session: Session, inspector: Inspector
+    ) -> None:
+        """Its description followed the refusal at once, as if it were applied."""
+        camera = session.project.scene.camera
+        own = CalibratedCamera(**{name: getattr(camera, name) for name in ("width", "height", "fx", "fy", "cx", "cy")})
+        session.set(("calibration",), Calibration(camera=own))
+        session.select(("sensor",))
+        before, told = session.project, []
+        session.message.connect(lambda level, text: told.append((level, text)))
+        action = next(entry for entry in inspector.presets.menu().actions() if "IMX174" in entry.text())
+        action.trigger()
+        assert session.project is before and [level for level, _ in told] == ["error"]
+        assert told[0][1] == (
+            f"{action.text()} is not taken, nothing has changed: the project's calibration is of a camera of "
+            f"{camera.width} x {camera.height} px, and this one has 1920 x 1200 px: "
+            "Calibrate > Remove it from the project, or calibrate anew"
+        )
+
+    def test_the_tip_of_a_preset_goes_with_its_menu(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
+        """It stayed over the camera's view for seconds."""
+        session.select(("sensor",))
+        menu = inspector.presets.menu()
+        menu.popup(inspector.mapToGlobal(QPoint(20, 20)))
+        place = menu.actionGeometry(menu.actions()[0]).center()
+        qtbot.mouseMove(menu, place + QPoint(3, 0))
+        qtbot.mouseMove(menu, place)
+        qtbot.waitUntil(QToolTip.isVisible)
+        qtbot.keyClick(menu, Qt.Key.Key_Escape)
+        qtbot.waitUntil(lambda: not QToolTip.isVisible())
+        assert not menu.toolTipsVisible(), "nor does one come that was waited for"
 
     def test_only_items_with_presets_have_the_menu(self, session: Session, inspector: Inspector) -> None:
         items = (LASER, CAMERA, ("sensor",), ("scene", "objects", 0), ("scene", "motion"), ())

@@ -17,7 +17,7 @@ from studio.qt.shell.window import MainWindow
 from studio.qt.shell.workspaces import WORKSPACES
 from studio.runtime.console import FRAMES
 from studio.scan.options import Listener, ScanOptions
-from tests.studio.qt.shell.window_hands import until_cancelled
+from tests.studio.qt.shell.window_hands import answer, until_cancelled
 
 MOTION = ("scene", "motion")
 
@@ -107,3 +107,72 @@ def test_a_step_that_moves_by_nothing_has_no_sign() -> None:
     """There stood "moved by (-0.00, 4.00, 0.00) mm"."""
     told = motion_panel.describe(LinearStage(step=(-1e-9, 0.002, 0.0), steps=3), 2)
     assert told.endswith(" moved by (0.00, 4.00, 0.00) mm")
+
+
+@pytest.fixture
+def stopped(window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MotionPanel:
+    """A scan of 20 frames of 5 mm was stopped, and the project has 9 of 10 mm by now."""
+
+    def scan(*_: object, **__: object) -> object:
+        raise Cancelled
+
+    monkeypatch.setattr("studio.scan.scan.run_scan", scan)
+    motion, session = window.panels["motion"], window.session
+    assert isinstance(motion, MotionPanel)
+    window.show_panel("motion")
+    session.set(("scene", "motion"), LinearStage(step=(0.0, 0.005, 0.0), steps=20))
+    with qtbot.waitSignal(window.runner.cancelled):
+        motion.run_into(tmp_path / "scan")
+    qtbot.waitUntil(lambda: motion.stopped is not None)
+    assert motion.other.isHidden(), "it is the same scan"
+    session.set(("scene", "motion"), LinearStage(step=(0.0, 0.01, 0.0), steps=9))
+    return motion
+
+
+def test_a_scan_of_other_settings_is_told_before_it_goes_on(stopped: MotionPanel) -> None:
+    expected = "goes on with the 20 frames of 5 mm that were begun; the project is now another"
+    for told in (stopped.other.text(), stopped.go_on.toolTip()):
+        assert expected in told and "Frames: 20 → 9" in told
+    assert stopped.other.isVisible()
+    stopped.session.document.undo()
+    assert not stopped.other.isVisible() and "another" not in stopped.go_on.toolTip()
+    stopped.session.document.redo()
+
+
+@pytest.mark.parametrize(
+    ("button", "begun", "anew"), [("Resume as begun", 1, 0), ("New scan…", 0, 1), ("Cancel", 0, 0)]
+)
+def test_it_is_asked_whether_other_settings_go_on(
+    stopped: MotionPanel,
+    window: MainWindow,
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
+    button: str,
+    begun: int,
+    anew: int,
+) -> None:
+    asked: list[object] = []
+    resumed: list[object] = []
+    monkeypatch.setattr(motion_panel, "ask_results_folder", lambda *given: asked.append(given))
+    monkeypatch.setattr(stopped, "resume", lambda: resumed.append(stopped.stopped))
+    answer(qtbot, "resume", button)
+    window.commands["resume_scan"].trigger()
+    assert (len(resumed), len(asked)) == (begun, anew)
+
+
+def test_a_scan_under_way_says_that_it_is_of_other_settings(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def scan(*_: object, listener: Listener, **__: object) -> None:
+        until_cancelled(listener.progress, listener.cancelled)
+
+    monkeypatch.setattr("studio.scan.scan.run_scan", scan)
+    motion = window.panels["motion"]
+    assert isinstance(motion, MotionPanel)
+    window.session.set(("scene", "motion"), LinearStage(step=(0.0, 0.005, 0.0), steps=20))
+    motion.run_into(tmp_path)
+    window.session.set(("scene", "motion", "steps"), 9)
+    assert motion.other.text().startswith("The scan under way goes on with the 20 frames of 5 mm")
+    with qtbot.waitSignal(window.runner.cancelled):
+        window.runner.cancel(RENDER)
+    assert motion.other.text().startswith("Resume goes on")

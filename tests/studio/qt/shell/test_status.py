@@ -44,6 +44,14 @@ def test_what_is_said_after_a_tip_is_read_and_no_tip_hides_a_warning(window: Mai
     assert window.status.text.text() == "Pause"
 
 
+def test_a_tip_goes_when_another_workspace_comes(window: MainWindow) -> None:
+    """The mouse rests on the toolbar's Measure, and F12 brings Study."""
+    show_tip(window, "Measure")
+    assert window.status.text.text() == "Measure"
+    window.commands["study"].trigger()
+    assert window.status.text.text() != "Measure"
+
+
 def test_the_buttons_stay_where_they_are_while_texts_come_and_go(window: MainWindow, qtbot: QtBot) -> None:
     """Who aimed at Cancel hit Pause."""
     status, go, done = window.status, Event(), Event()

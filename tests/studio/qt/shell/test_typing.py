@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, cast
 
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QEnterEvent, QKeyEvent
-from PySide6.QtWidgets import QApplication, QFileDialog
+from PySide6.QtWidgets import QApplication, QCheckBox, QComboBox, QFileDialog, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from studio.qt.shell.window import MainWindow
@@ -94,6 +96,40 @@ def test_keys_are_for_the_3d_view_that_the_mouse_comes_over(window: MainWindow, 
     tree.setFocus()
     QApplication.sendEvent(view, enter)
     assert view.hasFocus()
+
+
+@pytest.mark.parametrize("kind", [QPushButton, QCheckBox])
+def test_a_button_that_was_clicked_keeps_no_keys_from_the_3d_view(
+    window: MainWindow, power: Any, qtbot: QtBot, kind: type[QWidget]
+) -> None:
+    """After a click on a button of the inspector G and R did nothing over the view."""
+    before = window.session.project.scene.T_world_laser(0)[0, 3]
+    with left_for_the_view(window, kind()):
+        for key in ("g", "x", "3", "0", Qt.Key.Key_Return):
+            qtbot.keyClick(window.focusWidget(), key)
+    assert window.session.project.scene.T_world_laser(0)[0, 3] == pytest.approx(before + 0.03)
+    window.files.count_as_saved(window.session.project)
+
+
+@pytest.mark.parametrize("editable", [True, False])
+def test_a_list_that_is_typed_into_keeps_its_keys(window: MainWindow, power: Any, editable: bool) -> None:
+    box = QComboBox(editable=editable)
+    with left_for_the_view(window, box):
+        assert box.hasFocus() == editable
+
+
+@contextmanager
+def left_for_the_view(window: MainWindow, widget: QWidget) -> Iterator[None]:
+    """A widget of the inspector has the focus, and the mouse goes over the 3D view."""
+    widget.setParent(inspector_of(window))
+    widget.show()
+    widget.setFocus()
+    assert widget.hasFocus()
+    view = cast(Any, window.panels["viewport"]).view
+    QApplication.sendEvent(view, QEnterEvent(QPointF(5, 5), QPointF(5, 5), QPointF(5, 5)))
+    yield
+    widget.setParent(None)
+    widget.deleteLater()
 
 
 def test_ctrl_and_a_letter_is_the_menus_while_something_is_typed(

@@ -1,0 +1,54 @@
+"""A mesh file that is around the camera, mostly of another unit, is told once, and beside its buttons."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from pytestqt.qtbot import QtBot
+
+from render.base.pose import Pose
+from render.scene.scene import SceneObject
+from render.scene.shape import MeshFile
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Session
+from studio.qt.scene.inspector import Inspector
+
+OBJECTS = ("scene", "objects")
+UNIT = (*OBJECTS, 1, "shape", "unit")
+
+
+@pytest.fixture
+def part(session: Session, inspector: Inspector, qtbot: QtBot) -> list[str]:
+    """A ball of 2 m, in mm, before the camera is selected; what is told of it."""
+    mesh = trimesh.creation.icosphere(4, 1.0)
+    mesh.update_faces(np.arange(len(mesh.faces)) % 8 > 0)
+    folder = session.document.root
+    mesh.export(Path(folder) / "ball.ply")
+    pose = Pose.from_matrix(session.project.scene.T_world_camera()) @ Pose(translation=(0.0, 0.0, 0.3))
+    ball = SceneObject(name="ball", shape=MeshFile(path="ball.ply", unit="mm"), T_world_object=pose)
+    session.set(OBJECTS, (session.project.scene.objects[0], ball))
+    session.select((*OBJECTS, 1))
+    told: list[str] = []
+    session.message.connect(lambda level, text: told.append(text) if level == "warning" else None)
+    qtbot.waitUntil(lambda: "2 x 2 x 2 mm" in inspector.mesh_bar.told.text())
+    return told
+
+
+def test_in_too_large_a_unit_it_is_said_to_be_around_the_camera(
+    session: Session, inspector: Inspector, part: list[str], qtbot: QtBot
+) -> None:
+    bar = inspector.mesh_bar
+    assert "nside" not in bar.told.text() and not part
+    session.set(UNIT, "m")
+    qtbot.waitUntil(lambda: "The camera and laser are inside it" in bar.told.text())
+    assert "is its unit or scale another?" in bar.told.text()
+    assert len(part) == 1 and part[0].startswith("the camera and laser are inside ball: they see and light nothing")
+    session.set((*OBJECTS, 1, "material", "albedo"), 0.3)
+    qtbot.waitUntil(lambda: live(session).look.project is session.project and not live(session).is_loading)
+    assert len(part) == 1, "it is told when it comes about, not again and again"
+    session.document.undo()
+    session.document.undo()
+    qtbot.waitUntil(lambda: "inside" not in bar.told.text() and "2 x 2 x 2 mm" in bar.told.text())
