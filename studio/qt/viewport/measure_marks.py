@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
 import pyvista as pv
 from PySide6.QtCore import QObject
 from vtkmodules.vtkRenderingCore import vtkBillboardTextActor3D
 
 from analysis.cloud import at_step
+from render.base.arrays import Float
 from studio.qt.core import theme
 from studio.qt.core.session import Session
 from studio.qt.viewport.error_cloud import ErrorCloud
@@ -15,6 +19,9 @@ from studio.qt.viewport.viewport_scene import Lines
 from studio.scan.measures_in_3d import MeasureIn3D
 
 MEASURE_PX, FONT_PX = 3.0, 13
+ASIDE_PX, LINE_PX = 8, 22
+NEAR = 0.15
+"""Of the extent of all points: texts of nearer places would cover each other, and stand in lines."""
 NOT_IN_THE_FONT = str.maketrans({"✓": None, "✗": None, "\u00a0": " "})
 GROUND = 0.9
 """Opacity of what a text stands on, over points of any colour."""
@@ -40,15 +47,21 @@ class MeasureMarks(QObject):
         for label in self.labels:
             self.view.front.RemoveActor(label)
         self._lines, self.labels = [], []
-        for one in self.session.measures_in_3d if self.cloud.visible else ():
-            self._add(one)
+        shown = self.session.measures_in_3d if self.cloud.visible else ()
+        for i, one in enumerate(shown):
+            self._add(one, self._line_of(one.place, shown[:i]))
         for line in self._lines:
             self.view.renderer.AddActor(line.actor)
         for label in self.labels:  # before all points, which would cover its first letters
             self.view.front.AddActor(label)
         self.view.redraw()
 
-    def _add(self, one: MeasureIn3D) -> None:
+    def _line_of(self, place: Float, before: Sequence[MeasureIn3D]) -> int:
+        """How many of the texts before it stand near its own."""
+        near = NEAR * float(np.linalg.norm(np.ptp(self.cloud.points, axis=0))) if len(self.cloud.points) else 0.0
+        return sum(float(np.linalg.norm(other.place - place)) < near for other in before)
+
+    def _add(self, one: MeasureIn3D, line: int) -> None:
         scene, step = self.session.project.scene, self.session.step
         colour = theme.verdict_colour(one.verdict)
         for line in one.lines:
@@ -60,7 +73,7 @@ class MeasureMarks(QObject):
         label = vtkBillboardTextActor3D()
         label.SetInput(" ".join(one.text.translate(NOT_IN_THE_FONT).split()))
         label.SetPosition(*at_step(one.place[None], scene, step)[0])
-        label.SetDisplayOffset(8, 8)
+        label.SetDisplayOffset(ASIDE_PX, ASIDE_PX + LINE_PX * line)
         look = label.GetTextProperty()
         look.SetFontSize(FONT_PX)
         look.BoldOn()

@@ -21,7 +21,7 @@ from studio.qt.results.measures_table import shown
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell.window import MainWindow
 from studio.qt.viewport.error_cloud import ErrorCloud
-from studio.qt.viewport.measure_marks import MeasureMarks
+from studio.qt.viewport.measure_marks import FONT_PX, MeasureMarks
 from studio.scan.region import Region, members
 from studio.scan.stages import Clock, develop_step, measure_step, render_step
 
@@ -272,6 +272,11 @@ def test_a_measure_stands_in_3d_where_it_was_read_with_its_verdict(
     assert [label.GetInput() for label in marks.labels] == [one.text.replace("\u00a0", " ")]
     session.set(("measures",), (gauge.model_copy(update={"nominal": value, "lower": -0.005, "upper": 0.005}),))
     assert session.measures_in_3d[0].verdict == "pass" and "pass" in marks.labels[0].GetInput()
+    # another that is read nearby stands a line above it
+    session.set(("measures",), (gauge, gauge.model_copy(update={"name": "Again"})))
+    first, second = (label.GetDisplayOffset()[1] for label in marks.labels)
+    assert second >= first + FONT_PX
+    session.set(("measures",), (gauge,))
     # it goes with the points that it was read off
     scene = session.project.scene
     session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.9 * scene.lasers[0].fan_angle)
