@@ -17,6 +17,6 @@ def refusal(error: InputError) -> str:
     text = str(error)
     if not CALIBRATION.match(text):
         return text
-    text = OF_CAMERA.sub(r"the project's calibration is of a camera of \1 px, and this one has \2 px", text)
+    text = OF_CAMERA.sub(r"the project's calibration is of a camera of \1 px, and the project's would have \2 px", text)
     text = OF_LASERS.sub(r"the number of lasers of the calibration is \1, and the project would have \2", text)
     return f"{text.replace('calibration.motion', 'the motion of the calibration')}: {WAY_OUT}"

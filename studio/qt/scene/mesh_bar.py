@@ -96,9 +96,9 @@ class MeshBar(QWidget):
         else:
             sides = vertices.max(axis=0) - vertices.min(axis=0)
             size = " x ".join(f"{1e3 * side:.4g}" for side in sides) + " mm along x, y, z of the file"
-            met = self._met(item)
+            met, around = self._met(item), self._around(item)
             may = f". May stand in {met}: their boxes overlap." if met else ""
-            self.told.setText(f"{size}{may}{self._around(item)}")
+            self.told.setText(f"{size}{around or may}")
 
     def _turn_up(self, axis: mesh_placing.UpAxis) -> None:
         def turned(item: SceneObject, vertices: Float) -> SceneObject:
@@ -161,7 +161,7 @@ class MeshBar(QWidget):
         for one in inside(look):
             if _size(look.scene.visible_objects[one.index]) == _size(item):
                 told = one.of("it")
-                return f"\n{told[0].upper()}{told[1:]}; {CURE}"
+                return f". {told[0].upper()}{told[1:]}; {CURE}"
         return ""
 
     def after_edit(self, owner: FieldPath, before: Project, after: Project) -> Project:

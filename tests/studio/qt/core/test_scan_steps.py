@@ -26,6 +26,7 @@ from studio.qt.shell import file_actions
 from studio.qt.shell.window import MainWindow
 from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan_folder import image_scale_of, open_folder
+from tests.studio.qt.shell.window_hands import answer
 from tests.studio.scan_of_steps import SCALE, small_project, small_scan
 
 
@@ -323,7 +324,9 @@ class TestRun:
         begun = len(rendered)
         moving.scale.setCurrentText("quarter size")
         assert moving.go_on.text() == "Resume (half size)" and "at half size, as it began" in moving.go_on.toolTip()
-        window.session.set(("sensor", "bits"), 8)  # what goes on is what was begun
+        window.session.set(("sensor", "bits"), 8)
+        assert "Bit depth: 12 → 8" in moving.go_on.toolTip()
+        answer(qtbot, "resume", "Resume as begun")
         with qtbot.waitSignal(moving.runner.finished, timeout=60_000):
             qtbot.mouseClick(moving.go_on, Qt.MouseButton.LeftButton)
         # the first frame of the block teaches the others again

@@ -231,7 +231,7 @@ class TestMenus:
         assert session.project is before and [level for level, _ in told] == ["error"]
         assert told[0][1] == (
             f"{action.text()} is not taken, nothing has changed: the project's calibration is of a camera of "
-            f"{camera.width} x {camera.height} px, and this one has 1920 x 1200 px: "
+            f"{camera.width} x {camera.height} px, and the project's would have 1920 x 1200 px: "
             "Calibrate > Remove it from the project, or calibrate anew"
         )
 
