@@ -19,7 +19,7 @@ from studio.qt.viewport.viewport_scene import Lines
 from studio.scan.measures_in_3d import MeasureIn3D
 
 MEASURE_PX, FONT_PX = 3.0, 13
-ASIDE_PX, LINE_PX = 8, 22
+ASIDE_PX, ROW_PX = 8, 22
 NEAR = 0.15
 """Of the extent of all points: texts of nearer places would cover each other, and stand in lines."""
 NOT_IN_THE_FONT = str.maketrans({"✓": None, "✗": None, "\u00a0": " "})
@@ -49,19 +49,19 @@ class MeasureMarks(QObject):
         self._lines, self.labels = [], []
         shown = self.session.measures_in_3d if self.cloud.visible else ()
         for i, one in enumerate(shown):
-            self._add(one, self._line_of(one.place, shown[:i]))
+            self._add(one, self._row_of(one.place, shown[:i]))
         for line in self._lines:
             self.view.renderer.AddActor(line.actor)
         for label in self.labels:  # before all points, which would cover its first letters
             self.view.front.AddActor(label)
         self.view.redraw()
 
-    def _line_of(self, place: Float, before: Sequence[MeasureIn3D]) -> int:
+    def _row_of(self, place: Float, before: Sequence[MeasureIn3D]) -> int:
         """How many of the texts before it stand near its own."""
         near = NEAR * float(np.linalg.norm(np.ptp(self.cloud.points, axis=0))) if len(self.cloud.points) else 0.0
         return sum(float(np.linalg.norm(other.place - place)) < near for other in before)
 
-    def _add(self, one: MeasureIn3D, line: int) -> None:
+    def _add(self, one: MeasureIn3D, row: int) -> None:
         scene, step = self.session.project.scene, self.session.step
         colour = theme.verdict_colour(one.verdict)
         for line in one.lines:
@@ -73,7 +73,7 @@ class MeasureMarks(QObject):
         label = vtkBillboardTextActor3D()
         label.SetInput(" ".join(one.text.translate(NOT_IN_THE_FONT).split()))
         label.SetPosition(*at_step(one.place[None], scene, step)[0])
-        label.SetDisplayOffset(ASIDE_PX, ASIDE_PX + LINE_PX * line)
+        label.SetDisplayOffset(ASIDE_PX, ASIDE_PX + ROW_PX * row)
         look = label.GetTextProperty()
         look.SetFontSize(FONT_PX)
         look.BoldOn()
