@@ -22,7 +22,7 @@ from studio.project.date_and_time import now
 from studio.project.input_files import check_unchanged, input_hashes
 from studio.project.project import Project
 from studio.project.strict_json import read_object
-from studio.scan.stages import Measurement
+from studio.scan.stages import Measurement, scaled_sensor
 
 FOLDER, RECORD, STEM, PROJECT = "renders", "kept.json", "render", "project.json"
 FORMAT, VERSION = "blazer-render", 1
@@ -151,6 +151,24 @@ def open_kept(kept: Kept, root: Path) -> Frame:
     cure = "restore the files, or render again"
     check_unchanged(inputs if isinstance(inputs, dict) else {}, kept.project.scene, root, cure=cure)
     return read_frame(folder / f"{STEM}.json")
+
+
+def at_full_scale(kept: Kept, now: Project) -> Project:
+    """The scanner that a kept render is of; its camera is that of the project now, where that has its image as well."""
+    if kept.image_scale == 1.0:
+        return kept.project
+    small, its = kept.project.scene.camera, now.scene.camera
+    whole = its.model_copy(update={"lens": small.lens})
+    if whole.scaled(kept.image_scale) != small:  # sides are rounded, so that this one may be a pixel off
+        whole = small.scaled(1.0 / kept.image_scale)
+    scene = kept.project.scene
+    rig = scene.rig.model_copy(update={"camera": whole})
+    update = {
+        "scene": scene.model_copy(update={"rig": rig}),
+        "sensor": scaled_sensor(kept.project.sensor, 1.0 / kept.image_scale),
+        "calibration": kept.project.calibration.scaled(1.0 / kept.image_scale, whole),
+    }
+    return kept.project.model_copy(update=update)
 
 
 def rename(kept: Kept, name: str) -> None:

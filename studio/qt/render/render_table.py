@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from render.base.errors import InputError
+from render.world.material_checks import scene_warnings
 from render.world.world import build_world
 from studio.project.date_and_time import read_out
 from studio.qt.core.dialogs import export_csv, show_trouble
@@ -28,7 +29,7 @@ from studio.qt.core.session import Render, Session, one_of
 from studio.qt.core.widgets import room_for_a_window, text_button
 from studio.runtime.error_messages import trouble
 from studio.scan.gauging import readings
-from studio.scan.kept_renders import Kept, as_read_now, figures_of, keep, kept_renders, open_kept
+from studio.scan.kept_renders import Kept, as_read_now, at_full_scale, figures_of, keep, kept_renders, open_kept
 from studio.scan.remarks import best, scale_name, scale_notes
 from studio.study.side_by_side import Row, developed_as, scale_warnings, side_by_side, write_table
 
@@ -87,10 +88,13 @@ def open_render(session: Session, kept: Kept) -> Render:
     root = session.document.root
     frame = open_kept(kept, root)
     world = build_world(kept.project.scene, root, frame.step)
+    # a frame's file has what rendering warned of, and not what the scene does
+    warnings = dict.fromkeys((*frame.warnings, *scene_warnings(world, kept.project.scene, frame.step)))
+    frame = replace(frame, warnings=tuple(warnings))
     number = max([render.number for render in session.renders], default=0) + 1
     render = Render(number, kept.project, world, frame, name=kept.name, created=read_out(kept.created))
     render.image_scale, render.final, render.stopped = kept.image_scale, not kept.stopped, kept.stopped
-    render.source, render.kept = session.project, kept.folder
+    render.source, render.kept = at_full_scale(kept, session.project), kept.folder
     session.add_render(render)
     return render
 

@@ -12,12 +12,16 @@ from PySide6.QtWidgets import QListWidgetItem, QStyleOptionViewItem
 from pytestqt.qtbot import QtBot
 
 from render.output import frame_files
+from render.world.material_checks import scene_warnings
 from studio.project.document import Document
+from studio.project.project import Project
 from studio.qt.core.session import Render, Session
 from studio.qt.render import history as history_module
 from studio.qt.render.history import History
 from studio.qt.render.render_table import keep_render
-from studio.scan.kept_renders import Kept, kept_renders
+from studio.scan.kept_renders import Kept, at_full_scale, kept_renders
+from studio.scan.redevelop import is_stale
+from studio.scan.stages import scaled
 from tests.studio.qt.small_session import small_project, small_render
 
 
@@ -85,6 +89,46 @@ def test_kept_renders_stand_in_the_list_of_a_project_that_is_opened_again(
     assert np.array_equal(session.shown.frame.laser_direct[0], small_render()[1].laser_direct[0])
     assert texts(history)[row] == "first · kept", "it stays where it was clicked"
     assert history.selected() == [session.shown]
+
+
+@pytest.mark.parametrize("image_scale", [1.0, 0.3, 0.125])
+def test_the_scanner_of_a_kept_render_is_the_project_s_own_whatever_its_size(image_scale: float) -> None:
+    project = small_project()
+    kept = Kept("before", "", scaled(project, image_scale), image_scale, {})
+    assert not is_stale(at_full_scale(kept, project), project)
+    wider = project.replaced({"scene.rig.camera.fx": 1.1 * project.scene.camera.fx})
+    assert is_stale(at_full_scale(kept, wider), wider)
+    full, camera = at_full_scale(kept, wider), project.scene.camera
+    assert full.scene.camera.fx == pytest.approx(camera.fx, rel=1.0 / (image_scale * camera.width))
+
+
+def test_a_kept_render_of_another_scene_is_told_to_be_one(qtbot: QtBot, tmp_path: Path) -> None:
+    """After reopening it was shown beside a laser that had been moved since, without the banner of a stale render."""
+    keep_some(tmp_path, "before")
+    session = session_in(tmp_path)
+    place = ("scene", "rig", "lasers", 0, "T_rig_laser", "translation")
+    before = session.project.scene.lasers[0].T_rig_laser.translation
+    session.set(place, (before[0] + 0.005, *before[1:]))
+    session.document.save()
+
+    again = Session(Document(Project.load(tmp_path / "project.json"), tmp_path / "project.json"))
+    history = list_of(qtbot, again)
+    click(qtbot, history, 0, twice=True)
+    assert again.shown is not None and again.shown.name == "before" and again.shown.is_stale(again.project)
+    again.set(place, before)
+    assert not again.shown.is_stale(again.project)
+
+
+def test_a_kept_render_warns_of_what_it_warned_of_before(qtbot: QtBot, tmp_path: Path) -> None:
+    """Of smooth shading that its mesh does not have, say; a report that was made of it lacked that, too."""
+    keep_some(tmp_path, "only")
+    session = session_in(tmp_path)
+    history = list_of(qtbot, session)
+    click(qtbot, history, 0, twice=True)
+    assert session.shown is not None
+    world, frame = small_render()
+    wanted = {*frame.warnings, *scene_warnings(world, session.shown.project.scene, frame.step)}
+    assert set(session.shown.frame.warnings) == wanted
 
 
 def test_return_opens_the_one_that_is_current(qtbot: QtBot, tmp_path: Path) -> None:
