@@ -61,6 +61,12 @@ ERROR_VIEWS = (
 
 UNCERTAINTY = "Bias known to"
 COVERED = "Within 2 sigma"
+OUTLIERS: dict[ErrorKind, str] = {
+    "depth": "Outliers of depth",
+    "surface": "Outliers of the surface",
+    "position": "Outliers in the image",
+}
+"""By the error that is looked at; those in the image are what completeness leaves out."""
 MEASURED = (
     ("RMSE", "rmse"),
     ("Bias", "bias"),
@@ -146,7 +152,7 @@ def table(found: list[Measurement], view: ErrorView) -> list[tuple[str, str, lis
         ("Completeness", "%", [100.0 * one.errors.completeness for one in found]),
         ("False scan lines", "", [float(one.errors.false_rows) for one in found]),
     ]
-    rows.append(("Outliers", "%", [100.0 * one.outlier_rate for one in of]))
+    rows.append((OUTLIERS[view.kind], "%", [100.0 * one.outlier_rate for one in of]))
     rows.append((COVERED, "%", [100.0 * _covered(one, view) for one in found]))
     return rows
 
