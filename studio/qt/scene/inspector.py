@@ -149,11 +149,11 @@ class Inspector(QWidget):
         """For the mesh or image of what is at a path: a dialog, a copy into the project, and the edit."""
         root = self.session.document.root
         if path[-1] == "shape":
-            file = mesh_importer.choose_mesh(self)
+            file = mesh_importer.choose_mesh(self.session, self)
             if file is not None:
                 mesh_importer.import_meshes(self.session, [file], self, partial(take_mesh, self.session, path[:3]))
             return
-        file = mesh_importer.choose_file(self, "Image", IMAGE_FILES)
+        file = mesh_importer.choose_file(self.session, self, "Image", IMAGE_FILES)
         if file is None or not mesh_importer.may_copy(self, [file], root):
             return
         try:
