@@ -81,13 +81,13 @@ class Inspector(QWidget):
         column.addWidget(self.mesh_bar)
         column.addWidget(self.form)
         column.addStretch(1)
-        scroll = QScrollArea(widgetResizable=True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setWidget(content)
+        self.area = QScrollArea(widgetResizable=True)
+        self.area.setFrameShape(QFrame.Shape.NoFrame)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.area.setWidget(content)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 0, 0)
-        outer.addWidget(scroll)
+        outer.addWidget(self.area)
         self._menus_path: FieldPath | None = None
         session.selection_changed.connect(self.refresh)
         session.project_changed.connect(self.refresh)
@@ -123,6 +123,7 @@ class Inspector(QWidget):
         if path != self._menus_path:
             self._menus_path = path
             self._fill_menus(path, is_list)
+            self.area.verticalScrollBar().setValue(0)
 
     def _show_problem(self) -> None:
         """Why the selection is not as it is set: in words, and at its fields."""
