@@ -23,6 +23,8 @@ ErrorKind = Literal["depth", "surface", "position"]
 GAP = 4.0
 """Neighbouring crossings of the true line farther apart than this many px are not joined."""
 MOST_BINS = 81
+MOST_UM = 1e4
+"""From which on lengths are told in mm."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,11 @@ def error_values(errors: Errors, view: ErrorView) -> Float:
 def measures(errors: Errors, kind: ErrorKind) -> Measures:
     """The measures of a kind of error, stored units."""
     return {"depth": errors.depth_z, "surface": errors.surface, "position": errors.u}[kind]
+
+
+def readable_unit(unit: str, largest: float) -> tuple[str, float]:
+    """In which unit errors are told, and the factor to it; largest: of them, in `unit`."""
+    return ("mm", 1e-3) if unit == "µm" and largest >= MOST_UM * (1.0 - 1e-9) else (unit, 1.0)
 
 
 def symmetric_limit(error: Float, share: float = 98.0) -> float:

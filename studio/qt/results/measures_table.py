@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTab
 from analysis.report.colour import method_name
 from analysis.report.units import digits, digits_of_percent
 from studio.qt.core import theme
-from studio.scan.result_series import COVERED, OUTLIERS, UNCERTAINTY
+from studio.scan.result_series import COVERED, OUTLIERS, UNCERTAINTY, readable_unit
 
 HONEST = 88.0
 """Percent within 2 sigma below which more than noise moves the line; the report remarks on it from there as well."""
@@ -38,8 +38,6 @@ EXPLAINED = {
 }
 
 ROW_PX = 22
-MOST_UM = 1e4
-"""From which on a row is in mm."""
 
 
 def shown(value: float, unit: str = "") -> str:
@@ -53,9 +51,8 @@ def shown(value: float, unit: str = "") -> str:
 
 def readable(name: str, unit: str, values: list[float]) -> tuple[str, str, list[float]]:
     """A row as it is shown: in mm where a length has more than four digits in um."""
-    if unit == "µm" and any(abs(value) >= MOST_UM for value in values):
-        return name, "mm", [1e-3 * value for value in values]
-    return name, unit, values
+    shown_in, factor = readable_unit(unit, max((abs(value) for value in values if math.isfinite(value)), default=0.0))
+    return name, shown_in, [factor * value for value in values]
 
 
 class ReadOnlyTable(QTableWidget):
