@@ -130,10 +130,14 @@ def marked_verdict(row: Mapping[str, Any]) -> str:
     return verdict_text(row["verdict"], row.get("oblique"), MISSES in (row.get("remark") or ""))
 
 
-def label_of(one: Reading) -> str:
-    """Of a reading that has a value, for where it is drawn: its name, value and verdict, with what is amiss with it."""
+def label_of(one: Reading, step: str = "") -> str:
+    """Of a reading that has a value, for where it is drawn: its name, value and verdict, with what is amiss with it.
+
+    step: which it is of, where that is to be told; of a measure of all steps together it is not.
+    """
     told = verdict_text(one.verdict, one.oblique, MISSES in one.remark)
-    value = f"{one.gauge.name}: {value_text(one.value, one.sigma, one.gauge.unit)}"
+    name = f"{one.gauge.name}, {step}" if step and not one.gauge.of_scan else one.gauge.name
+    value = f"{name}: {value_text(one.value, one.sigma, one.gauge.unit)}"
     return value if told == NONE else f"{value}, {told}"
 
 

@@ -24,7 +24,7 @@ GLOSSARY = (
      "the triangulation. Of honest claims 95.4 % of the errors lie within ±2 sigma."),
     ("Correlation length", "How many neighbouring scan lines err alike, by speckle, smoothing or a filter of two "
      "dimensions: the variance of a mean over n lines is that many times the one of independent lines."),
-    ("Complete", "Share of the scan lines with a visible line on which it was found, and not as an outlier: rightly "
-     "measured."),
+    ("Complete", "Share of the scan lines with a visible line on which it was found, and not as an outlier in the "
+     "image: rightly measured."),
     ("px, DN, e⁻", "Pixel; digital number, the value in the image; electrons collected by a pixel."),
 )  # fmt: skip

@@ -47,7 +47,7 @@ def headline(report: ReportInput) -> str:
     side = "too far from" if depth.bias > 0 else "too near to"
     return (
         f"The line of {who} could be seen on {count(found.truth_rows)} scan lines {where}; "
-        f"{count(found.measured_rows)} of them ({percent(found.completeness)}) were measured by "
+        f"{count(found.measured_rows)} of them ({percent(found.completeness)}) were rightly measured by "
         f"{method_name(found.method)}. Against exact ground truth the depth is on average "
         f"{micrometres(abs(depth.bias), 2)} {side} the camera (bias) and scatters about that by "
         f"{micrometres(depth.sigma)} (standard deviation), {micrometres(depth.rmse)} in all (RMSE). "

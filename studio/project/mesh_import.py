@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -48,8 +48,8 @@ def is_mesh(file: Path) -> bool:
 
 
 def needs_copy(file: Path, root: Path) -> bool:
-    """The file is outside the project's folder, where a project may not read; of a STEP file, meshes are made there."""
-    return is_step(file) or not file.resolve().is_relative_to(root.resolve())
+    """The file is outside the project's folder, where a project may not read."""
+    return not file.resolve().is_relative_to(root.resolve())
 
 
 def import_mesh(file: Path, root: Path, view: float) -> ImportedMesh:
@@ -73,17 +73,26 @@ def import_mesh(file: Path, root: Path, view: float) -> ImportedMesh:
         raise
 
 
-def import_step(file: Path, root: Path, chord: float) -> list[ImportedMesh]:
-    """The parts of a STEP file as meshes in `meshes/` of the project, each with the bounds of the whole assembly.
-
-    root: the project's folder; chord: how far facets may be off the true surface, m. InputError: as `read_step`, or
-    the folder cannot be written; nothing is left behind then.
-    """
-    parts = read_step(file, chord)
+def folder_of_parts(file: Path, root: Path) -> Path:
+    """A new one below `meshes/` of a project for the parts of a STEP file, called as the file is."""
     folder, number = root.resolve() / FOLDER / file.stem, 1
     while folder.exists():
         number += 1
         folder = root.resolve() / FOLDER / f"{file.stem} {number}"
+    return folder
+
+
+def import_step(file: Path, root: Path, chord: float) -> list[ImportedMesh]:
+    """The parts of a STEP file as meshes in `meshes/` of the project, each with the bounds of the whole assembly.
+
+    A single part is called as the file is: programs write names of their own for it.
+    root: the project's folder; chord: how far facets may be off the true surface, m. InputError: as `read_step`, or
+    the folder cannot be written; nothing is left behind then.
+    """
+    parts = read_step(file, chord)
+    if len(parts) == 1:
+        parts = [replace(parts[0], name=file.stem)]
+    folder = folder_of_parts(file, root)
     places = np.concatenate([part.vertices for part in parts])
     bounds = tuple(places.min(axis=0).tolist()), tuple(places.max(axis=0).tolist())
     made: list[Path] = []

@@ -32,9 +32,18 @@ class MeasureIn3D:
 
 
 def measures_in_3d(
-    readings: list[Reading], profile: Profile, scene: Scene, laser: int, step: int, section: ProfileSection
+    readings: list[Reading],
+    profile: Profile,
+    scene: Scene,
+    laser: int,
+    step: int,
+    section: ProfileSection,
+    step_told: str = "",
 ) -> list[MeasureIn3D]:
-    """Of the readings of one laser's profile, those that have a value and lines of their own."""
+    """Of the readings of one laser's profile, those that have a value and lines of their own.
+
+    step_told: the step in words, where it stands behind their names.
+    """
     T_world_section = scene.T_world_camera(step) @ invert(T_section_camera(scene, laser, step, section))
     found = []
     for one in readings:
@@ -48,7 +57,7 @@ def measures_in_3d(
             at_first_step(transform_points(T_world_section, _in_section(line, profile)), scene, step) for line in lines
         ]
         at = placed[-1].mean(axis=0) if len(dimension) else placed[0][-1]
-        found.append(MeasureIn3D(label_of(one), one.verdict, tuple(placed), at))
+        found.append(MeasureIn3D(label_of(one, step_told), one.verdict, tuple(placed), at))
     return found
 
 

@@ -23,6 +23,8 @@ ErrorKind = Literal["depth", "surface", "position"]
 GAP = 4.0
 """Neighbouring crossings of the true line farther apart than this many px are not joined."""
 MOST_BINS = 81
+MOST_UM = 1e4
+"""From which on lengths are told in mm."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,12 @@ ERROR_VIEWS = (
 
 UNCERTAINTY = "Bias known to"
 COVERED = "Within 2 sigma"
+OUTLIERS: dict[ErrorKind, str] = {
+    "depth": "Outliers of depth",
+    "surface": "Outliers of the surface",
+    "position": "Outliers in the image",
+}
+"""By the error that is looked at; those in the image are what completeness leaves out."""
 MEASURED = (
     ("RMSE", "rmse"),
     ("Bias", "bias"),
@@ -107,6 +115,11 @@ def measures(errors: Errors, kind: ErrorKind) -> Measures:
     return {"depth": errors.depth_z, "surface": errors.surface, "position": errors.u}[kind]
 
 
+def readable_unit(unit: str, largest: float) -> tuple[str, float]:
+    """In which unit errors are told, and the factor to it; largest: of them, in `unit`."""
+    return ("mm", 1e-3) if unit == "µm" and largest >= MOST_UM * (1.0 - 1e-9) else (unit, 1.0)
+
+
 def symmetric_limit(error: Float, share: float = 98.0) -> float:
     """A round limit for an axis or colour bar centred on zero that holds so many percent of the errors."""
     size = np.abs(error[np.isfinite(error)])
@@ -146,7 +159,7 @@ def table(found: list[Measurement], view: ErrorView) -> list[tuple[str, str, lis
         ("Completeness", "%", [100.0 * one.errors.completeness for one in found]),
         ("False scan lines", "", [float(one.errors.false_rows) for one in found]),
     ]
-    rows.append(("Outliers", "%", [100.0 * one.outlier_rate for one in of]))
+    rows.append((OUTLIERS[view.kind], "%", [100.0 * one.outlier_rate for one in of]))
     rows.append((COVERED, "%", [100.0 * _covered(one, view) for one in found]))
     return rows
 

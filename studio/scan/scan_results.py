@@ -23,7 +23,7 @@ from render.world.world import World
 from studio.project.input_files import check_unchanged
 from studio.project.project import READ_OFF, Project
 from studio.scan.point_sample import PointSample
-from studio.scan.result_series import MEASURED, ErrorView
+from studio.scan.result_series import MEASURED, OUTLIERS, ErrorView
 from studio.scan.scan_folder import (
     MANIFEST,
     PROJECT,
@@ -118,7 +118,7 @@ class ScanResults:
             ("False scan lines", "", [_number(row, "false_scan_lines") for row in rows]),
         ]
         shares = [_number(row, "outliers") / n if n else math.nan for row, n in zip(rows, points, strict=True)]
-        found.append(("Outliers", "%", [100.0 * share for share in shares]))
+        found.append((OUTLIERS["position"], "%", [100.0 * share for share in shares]))
         return [row["method"] for row in rows], found
 
     def remarks(self) -> list[str]:

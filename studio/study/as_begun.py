@@ -9,7 +9,7 @@ from typing import Any
 
 from render.base.errors import InputError
 from studio.project.project import READ_OFF, Project
-from studio.study.changes import Change, changes
+from studio.study.changes import ONE, Change, changes
 from studio.study.store import FILE, described
 from studio.study.study import Study, field_place, parts_of
 
@@ -79,10 +79,10 @@ def told_apart(apart: tuple[str, ...]) -> str:
 
 def _told(change: Change) -> str:
     """Of long lists, as those of a calibration, only whether there is one."""
-    there, now = ("one" if is_long(value) else value for value in (change.a, change.b))
-    if there == now == "one":
+    there, now = (ONE if is_long(value) else value for value in (change.a, change.b))
+    if there == now == ONE:
         return f"{change.label}: another one in the folder"
-    return f"{change.label}: {there} in the folder, {'there is one' if now == 'one' else now} now"
+    return f"{change.label}: {there} in the folder, {'there is one' if now == ONE else now} now"
 
 
 def is_long(value: str) -> bool:

@@ -13,6 +13,8 @@ from studio.editing.forms import LABELS
 from studio.editing.units import Unit
 from studio.project.strict_json import brief
 
+ONE = "one"
+"""What is there, or is not, and has no kind that people know."""
 LEFT_OUT = {"schema_version", "sha256"}
 """Of the file's form, and of files, whose hashes are compared as such."""
 
@@ -86,5 +88,5 @@ def _shown(value: Any, unit: Unit) -> str:
     if isinstance(value, tuple) and all(isinstance(one, int | float) for one in value) and len(value) <= 4:
         return f"{', '.join(unit.format(one) for one in value)} {unit.shown}".rstrip()
     if isinstance(value, BaseModel):
-        return str(getattr(value, "kind", type(value).__name__)).replace("_", " ")
+        return str(getattr(value, "kind", ONE)).replace("_", " ")
     return value if isinstance(value, str) else brief(value if not _are_models(value) else len(value))

@@ -101,6 +101,12 @@ def developed_as(renders: Sequence[Kept], now: Project) -> str:
     return f"{told} A render of this session is developed as the project is then whenever it is shown; {_lower()}"
 
 
+def read_alike(one: Kept, other: Kept) -> bool:
+    """Whether both are of one size and developed by the same settings."""
+    apart = _developed_otherwise(_as_measured(one), _as_measured(other))
+    return one.image_scale == other.image_scale and not apart
+
+
 def scale_warnings(renders: Sequence[Kept]) -> list[str]:
     """Which columns are not the scanner's figures."""
     scales = dict.fromkeys(one.image_scale for one in renders if one.image_scale != 1.0)

@@ -31,7 +31,7 @@ from studio.runtime.error_messages import trouble
 from studio.scan.gauging import readings
 from studio.scan.kept_renders import Kept, as_read_now, at_full_scale, figures_of, keep, kept_renders, open_kept
 from studio.scan.remarks import best, scale_name, scale_notes
-from studio.study.side_by_side import Row, developed_as, scale_warnings, side_by_side, write_table
+from studio.study.side_by_side import Row, developed_as, read_alike, scale_warnings, side_by_side, write_table
 
 MEASURING = "The shown render is being measured with the settings of now; its figures are still those of before."
 HINT = (
@@ -158,10 +158,16 @@ class RenderTable(QDialog):
         return QSize(min(WIDEST_PX, columns + beside + margins.left() + margins.right()), 480)
 
     def _read(self) -> tuple[list[Kept], list[Row]]:
-        """Columns and rows, by the figures of now."""
-        session = self.session
-        kept = (as_read_now(one, session.project) for one in self._kept)
-        renders = [*(as_kept(session, render, _titled(render, name)) for render, name in self._shown), *kept]
+        """Columns and rows, by the figures of now; a kept render that is open has one where it is read as kept."""
+        session, own = self.session, []
+        kept = {one.folder: as_read_now(one, session.project) for one in self._kept}
+        for render, name in self._shown:
+            column, there = as_kept(session, render, _titled(render, name)), kept.get(render.kept)
+            if there is None or not read_alike(column, there):
+                own.append(column)
+            elif column.figures:
+                kept[there.folder] = replace(column, name=there.name, created=there.created, folder=there.folder)
+        renders = [*own, *kept.values()]
         return renders, side_by_side(renders, session.project)
 
     def _refresh(self) -> None:

@@ -11,13 +11,16 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTab
 from analysis.report.colour import method_name
 from analysis.report.units import digits, digits_of_percent
 from studio.qt.core import theme
-from studio.scan.result_series import COVERED, UNCERTAINTY
+from studio.scan.result_series import COVERED, OUTLIERS, UNCERTAINTY, readable_unit
 
 HONEST = 88.0
 """Percent within 2 sigma below which more than noise moves the line; the report remarks on it from there as well."""
+USUAL = "and than five times the usual error or half the line's width"
+COUNTED = "Completeness counts them unless they are outliers in the image too; those of a wrong calibration are not."
 EXPLAINED = {
     "Points": "Points measured.",
-    "Completeness": "Share of the scan lines on which the line can be seen that have a point of it, and no outlier.",
+    "Completeness": "Share of the scan lines on which the line can be seen that have a point of it, and no outlier in "
+    "the image.",
     "False scan lines": "Scan lines with a point although no line is to be seen there.",
     "Bias": "Mean error: what averaging does not remove.",
     UNCERTAINTY: "Twice the standard deviation of the bias, as neighbouring scan lines err alike: a smaller one may be "
@@ -26,15 +29,15 @@ EXPLAINED = {
     "RMSE": "Bias and sigma together: the root of the mean squared error.",
     "Robust sigma": "The spread as it would be without outliers.",
     "95 % within": "95 % of the errors are smaller than this.",
-    "Outliers": "Errors larger than a pixel, and than five times the usual error or half the line's width.",
+    OUTLIERS["depth"]: f"Points whose depth is off by more than a pixel makes, {USUAL}. {COUNTED}",
+    OUTLIERS["surface"]: f"Points that are off the surface by more than a pixel makes, {USUAL}. {COUNTED}",
+    OUTLIERS["position"]: f"Peaks that are off the line by more than a pixel, {USUAL}. Completeness leaves them out.",
     COVERED: "Share of the errors within twice the predicted sigma, of the image's noise and, where points are made "
     "with a calibration, of that: 95 % where nothing else moves the line. Less: texture or edges under it, or too few "
     "pixels. A calibration's error is common to all points, so that all of them may be within or without.",
 }
 
 ROW_PX = 22
-MOST_UM = 1e4
-"""From which on a row is in mm."""
 
 
 def shown(value: float, unit: str = "") -> str:
@@ -48,9 +51,8 @@ def shown(value: float, unit: str = "") -> str:
 
 def readable(name: str, unit: str, values: list[float]) -> tuple[str, str, list[float]]:
     """A row as it is shown: in mm where a length has more than four digits in um."""
-    if unit == "µm" and any(abs(value) >= MOST_UM for value in values):
-        return name, "mm", [1e-3 * value for value in values]
-    return name, unit, values
+    shown_in, factor = readable_unit(unit, max((abs(value) for value in values if math.isfinite(value)), default=0.0))
+    return name, shown_in, [factor * value for value in values]
 
 
 class ReadOnlyTable(QTableWidget):

@@ -18,6 +18,7 @@ from analysis.report.gauge_table import label_of
 from render.base.arrays import Float
 from studio.qt.core import theme
 from studio.qt.results import plots
+from studio.qt.results.inside_text import InsideText
 
 NAME_AT, NAME_APART = 0.95, -0.08
 """Of the plot's height, from its top: names stand at the bottom, values beside their dimensions."""
@@ -37,14 +38,18 @@ class PartDrawing(QObject):
         self.spans: list[plots.Span] = []
         self.locked = True
         """Regions are drawn but not to be moved, and a drag is the plot's."""
+        self.texts: list[InsideText] = []
+        """Of the chosen measure, where it is drawn."""
         self._items: list[Any] = []
         self._made_for: tuple[Kind | None, str] = None, ""
 
-    def show_readings(self, readings: list[Reading], profile: Profile | None, chosen: Gauge | None) -> None:
-        """Curves and dimension of each; the chosen one thicker, with its value."""
-        for item in self._items:
+    def show_readings(
+        self, readings: list[Reading], profile: Profile | None, chosen: Gauge | None, step: str = ""
+    ) -> None:
+        """Curves and dimension of each; the chosen one thicker, with its value, and the step where one is given."""
+        for item in (*self._items, *self.texts):
             self.plot.removeItem(item)
-        self._items = []
+        self._items, self.texts = [], []
         for one in readings:
             if profile is None or one.reason:
                 continue
@@ -56,7 +61,7 @@ class PartDrawing(QObject):
                 self._line(dimension, pg.mkPen(colour, width=1.6, style=Qt.PenStyle.DashLine))
             if is_chosen and (curves or len(dimension)):
                 at = dimension.mean(axis=0) if len(dimension) else curves[0][-1]
-                self._text(label_of(one), at, colour)
+                self._text(label_of(one, step), at, colour)
 
     def show_regions(self, kind: Kind | None, regions: Sequence[tuple[float, float]] = ()) -> None:
         """Of one measure, as many as there are yet; once all are there they move, unless `locked`. None: of none."""
@@ -90,12 +95,9 @@ class PartDrawing(QObject):
         self._items.append(item)
 
     def _text(self, text: str, at: Float, colour: str) -> None:
-        ground = pg.mkColor(theme.colours().base)
-        ground.setAlpha(215)
-        low, high = self.plot.vb.viewRange()[0]
-        leaves_room = at[0] * TO_PLOT[0] < 0.5 * (low + high)
-        item = pg.TextItem(text, color=colour, anchor=(-0.06, 0.5) if leaves_room else (1.06, 0.5), fill=ground)
+        item = InsideText(text, colour)
         item.setPos(*(at * TO_PLOT))
         item.setZValue(40)
         self.plot.addItem(item, ignoreBounds=True)
-        self._items.append(item)
+        item.keep_inside()
+        self.texts.append(item)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from analysis.gauges.gauge import Gauge
@@ -15,6 +16,11 @@ from studio.scan.scan_results import ScanResults
 AGAIN = "Measure > Measure the scan again"
 MEASURED_LAST = "as measured last"
 LAST = f"{MEASURED_LAST}, by the tolerance of now"
+
+
+def value_of_worst(entry: Mapping[str, Any], value: str) -> str:
+    """The value of an entry as it is shown, with its step where it is one of several."""
+    return f"{value} (step {entry['step'] + 1})" if worst_of(entry) else value
 
 
 class PartSteps:
@@ -43,6 +49,12 @@ class PartSteps:
     def shown(self, gauge: Gauge) -> dict[str, Any] | None:
         """The same while the figures of all steps are asked for; None: this step's are shown."""
         return self.entry(gauge) if self._scan_bar.whole is not None else None
+
+    @property
+    def drawn(self) -> str:
+        """Of which step the values are that are drawn, while those of the table are of all; else empty."""
+        render = self._session.shown
+        return "" if render is None or self._scan_bar.whole is None else f"step {render.frame.step + 1}"
 
     def of_which(self, gauge: Gauge) -> str:
         """Beside a verdict of one step of a scan, or of all that are read together."""

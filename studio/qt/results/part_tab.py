@@ -35,7 +35,7 @@ from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.part_drawing import PartDrawing
 from studio.qt.results.part_editor import PartEditor
 from studio.qt.results.part_menu import PartMenu
-from studio.qt.results.part_steps import PartSteps
+from studio.qt.results.part_steps import PartSteps, value_of_worst
 from studio.qt.results.results_profile import ProfilePlot
 from studio.qt.results.scan_bar import ScanBar
 from studio.scan.gauging import OF_SCAN, judged_over_steps, kept_readings, profiles, read_each
@@ -284,7 +284,7 @@ class PartTab(QWidget):
         of_laser = [one for one in self.readings if one.gauge.laser == self.laser]
         own = self.readings[index].gauge if self.readings and index >= 0 else None
         profile = self._profiles[self.laser][0] if self.laser in self._profiles else None
-        self.drawing.show_readings(of_laser, profile, own)
+        self.drawing.show_readings(of_laser, profile, own, self._steps.drawn)
         self.session.show_measures_in_3d(self._in_3d())
         self._tell()
 
@@ -296,7 +296,7 @@ class PartTab(QWidget):
         scene, step, found = render.project.scene, render.frame.step, []
         for laser, (measured, _) in self._profiles.items():
             of_laser = [one for one in self.readings if one.gauge.laser == laser]
-            found += measures_in_3d(of_laser, measured, scene, laser, step, section)
+            found += measures_in_3d(of_laser, measured, scene, laser, step, section, self._steps.drawn)
         return tuple(found)
 
     def _entry(self, row: int) -> dict[str, Any] | None:
@@ -315,8 +315,8 @@ class PartTab(QWidget):
             of = "" if entry["readings"] > 1 else self._steps.of_which(gauge)
             # counts have no room beside a name: the tip has them
             verdict = "not measured" if entry["reason"] else marked_verdict(entry)
-            judged = verdict != NONE or not of
-            texts[1:] = [value, sigma, error, f"{verdict}{of}" if judged else of.removeprefix(", ")]
+            verdict = f"{verdict}{of}" if verdict != NONE or not of else of.removeprefix(", ")
+            texts[1:] = [value_of_worst(entry, value), sigma, error, verdict]
             truth = value_text(entry["truth"], entry["sigma"], gauge.unit)
             in_sigmas = "" if ratio == NONE else f" ({ratio} sigma)"
             tip += f"<p>{whole_verdict}{of}</p>" + (

@@ -13,7 +13,7 @@ from render.base.arrays import Float
 from studio.qt.core import theme
 from studio.qt.results import plots
 from studio.scan.first_range import Column, line_range
-from studio.scan.result_series import ErrorView, Series, symmetric_limit
+from studio.scan.result_series import ErrorView, Series, readable_unit, symmetric_limit
 
 PLOTTED = 99.5
 """Percent of the errors within the axis; the others are crosses at its ends."""
@@ -48,16 +48,18 @@ class RowPlots(plots.PointedPlots):
     def show_series(
         self, axis: str, truth: Series | None, measured: dict[str, tuple[Series, Float]], view: ErrorView
     ) -> None:
-        """measured: by method, with its errors in the view's unit."""
+        """measured: by method, with its errors in the view's unit; drawn in mm where they are large."""
         for plot, item in self._drawn:
             plot.removeItem(item)
         self._drawn = []
+        largest = max([symmetric_limit(error, PLOTTED) for _, error in measured.values()], default=1.0)
+        unit, factor = readable_unit(view.unit, largest)
+        measured = {method: (series, factor * error) for method, (series, error) in measured.items()}
         self._shown = measured
-        errors = [error for _, error in measured.values()]
-        limit = self.limit = max([symmetric_limit(error, PLOTTED) for error in errors], default=1.0)
+        limit = self.limit = factor * largest
         self.error.setLabel("bottom", "Row" if axis == "rows" else "Column")
         self.position.setLabel("left", f"{'u' if axis == 'rows' else 'v'} / px")
-        self.error.setLabel("left", f"Error / {view.unit}")
+        self.error.setLabel("left", f"Error / {unit}")
         for method, (series, error) in reversed(measured.items()):  # the first method on top
             for plot, values in ((self.position, series.position), (self.depth, series.depth), (self.error, error)):
                 here = np.isfinite(values) if plot is not self.error else np.abs(values) <= limit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from PySide6.QtCore import Signal
 from analysis.report.colour import method_colour
 from render.base.arrays import Float
 from studio.qt.results import plots
-from studio.scan.result_series import ErrorView
+from studio.scan.result_series import ErrorView, readable_unit
 
 
 class StepsPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
@@ -31,15 +32,19 @@ class StepsPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self.repaint_theme()
 
     def show_steps(self, method: str, bias: Float, rmse: Float, view: ErrorView, title: str = "") -> None:
-        """(steps,) in the view's unit, of the scan's own method."""
+        """(steps,) in the view's unit, of the scan's own method; drawn in mm where they are large."""
         self.count = len(rmse)
         plots.set_title(self.plot, title)
-        self.plot.setLabel("left", f"{view.title} / {view.unit}")
+        largest = max((float(value) for value in rmse if math.isfinite(value)), default=0.0)  # no mean error is larger
+        unit, factor = readable_unit(view.unit, largest)
+        self.plot.setLabel("left", f"{view.title} / {unit}")
         steps, colour = np.arange(1, self.count + 1), method_colour(method)
         self.rmse.setPen(pg.mkPen(colour, width=1.6))
-        self.rmse.setData(steps, rmse, symbol="o" if self.count <= 200 else None, symbolBrush=pg.mkBrush(colour))
+        self.rmse.setData(
+            steps, factor * rmse, symbol="o" if self.count <= 200 else None, symbolBrush=pg.mkBrush(colour)
+        )
         self.bias.setPen(pg.mkPen(colour, width=1.2, style=pg.QtCore.Qt.PenStyle.DashLine))
-        self.bias.setData(steps, bias)
+        self.bias.setData(steps, factor * bias)
         self.plot.enableAutoRange()
 
     def mark(self, step: int) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from analysis.report.colour import method_colour
 from analysis.report.units import digits
 from analysis.triangulate import PointFlag
-from studio.scan.result_series import ErrorView, error_values
+from studio.scan.result_series import ErrorView, error_values, readable_unit
 from studio.scan.stages import Measurement
 
 NO_DEPTH = {
@@ -35,7 +35,8 @@ def reading(
         for i in np.flatnonzero(one.points.index == scan_line)[:1]:
             error, depth = float(error_values(one.errors, view)[i]), 1e3 * float(one.points.depth_z[i])
             known = math.isfinite(error)
-            said = f"{'+' if error > 0 else ''}{digits(error)} {view.unit}" if known else "no truth here"
+            unit, factor = readable_unit(view.unit, abs(error))
+            said = f"{'+' if error > 0 else ''}{digits(factor * error)} {unit}" if known else "no truth here"
             told = NO_DEPTH.get(PointFlag(one.points.flag[i]), f"{depth:.3f} mm ({said})")
             parts.append(f"<span style='color:{method_colour(method)}'>●</span> {told}")
             first = error if first is None and known else first

@@ -81,13 +81,13 @@ class Inspector(QWidget):
         column.addWidget(self.mesh_bar)
         column.addWidget(self.form)
         column.addStretch(1)
-        scroll = QScrollArea(widgetResizable=True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setWidget(content)
+        self.area = QScrollArea(widgetResizable=True)
+        self.area.setFrameShape(QFrame.Shape.NoFrame)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.area.setWidget(content)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 0, 0)
-        outer.addWidget(scroll)
+        outer.addWidget(self.area)
         self._menus_path: FieldPath | None = None
         session.selection_changed.connect(self.refresh)
         session.project_changed.connect(self.refresh)
@@ -123,6 +123,7 @@ class Inspector(QWidget):
         if path != self._menus_path:
             self._menus_path = path
             self._fill_menus(path, is_list)
+            self.area.verticalScrollBar().setValue(0)
 
     def _show_problem(self) -> None:
         """Why the selection is not as it is set: in words, and at its fields."""
@@ -149,11 +150,11 @@ class Inspector(QWidget):
         """For the mesh or image of what is at a path: a dialog, a copy into the project, and the edit."""
         root = self.session.document.root
         if path[-1] == "shape":
-            file = mesh_importer.choose_mesh(self)
+            file = mesh_importer.choose_mesh(self.session, self)
             if file is not None:
                 mesh_importer.import_meshes(self.session, [file], self, partial(take_mesh, self.session, path[:3]))
             return
-        file = mesh_importer.choose_file(self, "Image", IMAGE_FILES)
+        file = mesh_importer.choose_file(self.session, self, "Image", IMAGE_FILES)
         if file is None or not mesh_importer.may_copy(self, [file], root):
             return
         try:

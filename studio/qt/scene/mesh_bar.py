@@ -210,7 +210,7 @@ def replace_mesh(session: Session, parent: QWidget) -> None:
         session.message.emit("error", "select an object of a mesh file; its mesh is what is replaced")
         return
     path = session.selection[:3]
-    file = mesh_importer.choose_mesh(parent)
+    file = mesh_importer.choose_mesh(session, parent)
     if file is not None:
         take = partial(take_mesh, session, path)
         mesh_importer.import_meshes(session, [file], parent, take)

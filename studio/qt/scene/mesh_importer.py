@@ -12,7 +12,7 @@ from render.base.errors import InputError
 from studio.editing.placement import field_of_view
 from studio.editing.scene_edits import add_mesh, add_parts
 from studio.preview.readouts import facet_chord, readouts
-from studio.project.mesh_import import ImportedMesh, import_mesh, import_step, needs_copy
+from studio.project.mesh_import import ImportedMesh, folder_of_parts, import_mesh, import_step, needs_copy
 from studio.project.step_file import LARGEST_CHORD, LEAST_CHORD, is_step
 from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.live_preview import live
@@ -54,19 +54,19 @@ running: set[ImportThread] = set()
 """Imports under way."""
 
 
-def choose_file(parent: QWidget, title: str, kinds: str) -> Path | None:
+def choose_file(session: Session, parent: QWidget, title: str, kinds: str) -> Path | None:
     """A file by the desktop's dialog, or None."""
-    name, _ = QFileDialog.getOpenFileName(parent, title, "", kinds)
+    name, _ = QFileDialog.getOpenFileName(parent, title, str(session.place), kinds)
     return Path(name) if name else None
 
 
-def choose_mesh(parent: QWidget) -> Path | None:
-    return choose_file(parent, "Mesh file", MESH_FILES)
+def choose_mesh(session: Session, parent: QWidget) -> Path | None:
+    return choose_file(session, parent, "Mesh file", MESH_FILES)
 
 
 def choose_meshes(session: Session, parent: QWidget) -> None:
     """Import what a person picks in the desktop's dialog."""
-    names, _ = QFileDialog.getOpenFileNames(parent, "Import meshes", "", MESH_FILES)
+    names, _ = QFileDialog.getOpenFileNames(parent, "Import meshes", str(session.place), MESH_FILES)
     import_meshes(session, [Path(name) for name in names], parent)
 
 
@@ -76,9 +76,16 @@ def may_copy(parent: QWidget, files: list[Path], root: Path) -> bool:
     if not outside:
         return True
     names = outside[0].name if len(outside) == 1 else f"{len(outside)} files"
-    box = QMessageBox(QMessageBox.Icon.Question, "Copy into the project", f"Copy {names} into the project's folder?")
-    box.setInformativeText(f"A project uses only files in its own folder, so that it can be moved:\n{root}")
-    copy = box.addButton("Copy", QMessageBox.ButtonRole.AcceptRole)
+    title, verb, asked, place = "Copy into the project", "Copy", f"Copy {names} into the project's folder?", root
+    how = "A project uses only files in its own folder, so that it can be moved"
+    if len(outside) == 1 and is_step(outside[0]):
+        title, verb, asked = "Write into the project", "Write", f"Write the parts of {names} into the project's folder?"
+        how, place = f"{how}: the parts are written as PLY files into", folder_of_parts(outside[0], root)
+    elif any(map(is_step, outside)):
+        how = f"{how}. Of a STEP file the parts are written, as PLY files"
+    box = QMessageBox(QMessageBox.Icon.Question, title, asked)
+    box.setInformativeText(f"{how}:\n{place}")
+    copy = box.addButton(verb, QMessageBox.ButtonRole.AcceptRole)
     box.addButton(QMessageBox.StandardButton.Cancel)
     box.setDefaultButton(copy)
     box.exec()
@@ -139,7 +146,7 @@ def _told(meshes: list[ImportedMesh], chord: float, wanted: float) -> str:
     tenth = "a tenth of the predicted depth sigma"
     why = tenth if chord == wanted else f"{tenth} is {1e6 * wanted:.2g} µm"
     facets = f"facets at most {1e6 * chord:.2g} µm off ({why})"
-    return f"{parts}, {size} mm, {triangles} triangles{closed}; {facets}"
+    return f"{parts} in {Path(first.path).parent.as_posix()}, {size} mm, {triangles} triangles{closed}; {facets}"
 
 
 def _add(session: Session, meshes: list[ImportedMesh]) -> None:

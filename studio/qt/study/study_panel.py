@@ -25,6 +25,7 @@ from studio.qt.core.icons import icon_button
 from studio.qt.core.jobs import JobRunner, duration
 from studio.qt.core.run_foot import RunFoot
 from studio.qt.core.session import Session, one_of
+from studio.qt.core.tab_order import tab_as_laid_out
 from studio.qt.core.widgets import Scrolled, align_labels, flush, text_button
 from studio.qt.study.study_work import StudyWork
 from studio.qt.study.sweep_editor import SweepEditor
@@ -201,6 +202,7 @@ class StudyPanel(QWidget):
         self.foot.choose.clicked.connect(lambda: self.ask_folder())
         self.foot.run.clicked.connect(self.ask_and_run)
         self.foot.stop.clicked.connect(work.stop)
+        self.editor.rows_made.connect(self._order_tabs)
         work.draft_changed.connect(self.refresh)
         work.estimated.connect(self._tell_estimate)
         for changed in (work.state_changed, work.found_changed):
@@ -286,6 +288,10 @@ class StudyPanel(QWidget):
         layout = flush(QVBoxLayout(self))
         layout.addWidget(Scrolled(inside), 1)
         layout.addLayout(foot)
+        self._order_tabs()
+
+    def _order_tabs(self) -> None:
+        tab_as_laid_out(self)
 
 
 def estimate_text(told: Estimate, processors: int) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, get_args
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -65,6 +65,9 @@ def measure_choices(work: StudyWork, asked: Sequence[str] = ()) -> list[tuple[st
 
 class SweepEditor(QWidget):
     """Changes the draft of a `StudyWork`, and follows it."""
+
+    rows_made = Signal()
+    """Of fields that are varied, anew."""
 
     def __init__(self, work: StudyWork) -> None:
         super().__init__()
@@ -163,6 +166,7 @@ class SweepEditor(QWidget):
                 row.removed.connect(partial(self._remove, number))
                 row.given_up.connect(partial(work.session.message.emit, "warning"))
                 self.list.addWidget(row)
+            self.rows_made.emit()
         for row, parameter in zip(self.rows, vary, strict=True):
             row.refresh(parameter)
             row.allow_count(work.sweep.get("sampling", "grid") in ("grid", "boundary"))

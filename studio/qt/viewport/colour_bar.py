@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 from render.base.arrays import Float
 from studio.qt.core import theme
 from studio.scan.colour_scale import PER_METRE, SHARES, ColourScale, tick
+from studio.scan.result_series import readable_unit
 
 TIP = (
     "Drag an end to another value; a double click brings back what was there. Right click: percentiles, "
@@ -44,7 +45,11 @@ class ColourBar(QWidget):
         self.by_share = True
         """No hand and no first limits decide."""
         self.units = {"error": "\u00b5m", "height": "mm", "deviation": "\u00b5m", "map": "mm"}
-        """In which lengths of each meaning are told."""
+        """In which lengths of each meaning are told, unless they are large."""
+        self._told = dict(self.units)
+        """In which they were told last."""
+        self._chosen: set[str] = set()
+        """Meanings whose unit a person chose."""
         self.meaning = "error"
         self._held: bool | None = None
         """Which end is dragged: the upper one; None: none."""
@@ -54,9 +59,13 @@ class ColourBar(QWidget):
         view.installEventFilter(self)
         self._place()
 
-    def unit_of(self, meaning: str) -> str:
+    def unit_of(self, meaning: str, largest: float = 0.0, by_hand: bool = False) -> str:
+        """In which lengths of it are told. largest: of its limits, µm; by_hand: these stay in the unit they had."""
         self.meaning = meaning
-        return self.units[meaning]
+        if not by_hand:
+            own = self.units[meaning]
+            self._told[meaning] = own if meaning in self._chosen else readable_unit(own, largest)[0]
+        return self._told[meaning]
 
     def show_scale(
         self,
@@ -103,8 +112,9 @@ class ColourBar(QWidget):
         return made
 
     def _choose_unit(self, unit: str) -> None:
-        factor = PER_METRE[unit] / PER_METRE[self.units[self.meaning]]
-        self.units[self.meaning] = unit
+        factor = PER_METRE[unit] / PER_METRE[self._told[self.meaning]]
+        self.units[self.meaning] = self._told[self.meaning] = unit
+        self._chosen.add(self.meaning)
         if self.scale.by_hand is not None:
             low, high = self.scale.by_hand
             self.scaled.emit(self.scale.at(low * factor, high * factor))

@@ -237,10 +237,7 @@ class ErrorCloud(QObject):
         self._first = first
         self.points = at_step(first, self.session.project.scene, self.session.step) if len(first) else first
         title, unit, self.errors = self._values(first)
-        scale, limits = self.scales[self.meaning], None
-        if deviation is not None and deviation.limit is not None:
-            top = deviation.limit * PER_METRE[unit]
-            limits = (-top, top)
+        scale, limits = self.scales[self.meaning], self._first_limits(PER_METRE.get(unit, 1.0))
         low, high = self.bar.show_scale(title, unit, scale, self.errors, self.image_scale, limits, self._sides)
         _give(self._data, self.points, scale.colours(self.errors, low, high))
         self._mark()
@@ -256,16 +253,28 @@ class ErrorCloud(QObject):
 
     def _values(self, first: Float) -> tuple[str, str, Float]:
         """What colours mean, its unit, and it of each point, in this unit."""
-        length, deviation = self.bar.unit_of(self.meaning), self.session.deviation
+        deviation, view = self.session.deviation, self.error_view
         if deviation is not None:
-            return "Deviation", length, deviation.value * PER_METRE[length]
-        if self.by_height:
-            return "Height", length, first[:, 2] * PER_METRE[length]
-        view = self.error_view
-        errors = np.concatenate([np.zeros(0), *(self._errors_of(i, one) for i, one in enumerate(self._clouds))])
-        if view.kind == "position":
-            return view.title, view.unit, errors
-        return view.title, length, errors * (PER_METRE[length] / view.scale)
+            title, metres = "Deviation", deviation.value
+        elif self.by_height:
+            title, metres = "Height", first[:, 2]
+        else:
+            errors = np.concatenate([np.zeros(0), *(self._errors_of(i, one) for i, one in enumerate(self._clouds))])
+            if view.kind == "position":
+                self.bar.meaning = self.meaning
+                return view.title, view.unit, errors
+            title, metres = view.title, errors / view.scale
+        scale = self.scales[self.meaning]
+        largest = 1e6 * scale.limits(metres, self._first_limits(1.0))[1]
+        unit = self.bar.unit_of(self.meaning, largest, scale.by_hand is not None)
+        return title, unit, metres * PER_METRE[unit]
+
+    def _first_limits(self, per_metre: float) -> tuple[float, float] | None:
+        """Of a deviation that has some, in so many units a metre."""
+        deviation = self.session.deviation
+        if deviation is None or deviation.limit is None:
+            return None
+        return -deviation.limit * per_metre, deviation.limit * per_metre
 
     def _errors_of(self, i: int, one: Cloud) -> Float:
         view = self.error_view

@@ -82,6 +82,7 @@ def test_the_report_says_which_figures_are_of_a_sample(quick_reports: None) -> N
     assert "points in a sample" in headline(dataclasses.replace(report, record=record))
     assert "are nearer (sample)" in page and "of the 6\u2009000 points" in page
     assert sample_note(total(report.record.chosen())) == "" and "sample" not in headline(report)
+    assert ") were rightly measured by" in headline(report), "points that are wrong are among those of its figures"
 
 
 def test_every_scan_line_is_as_likely_in_the_sample_and_methods_share_it() -> None:

@@ -70,6 +70,16 @@ def test_parts_are_objects_that_stand_to_each_other_as_in_the_assembly(
     assert [item.name for item in twice.scene.objects[-2:]] == ["copy 2", "lid 2"]
 
 
+def test_a_single_part_is_called_as_its_file_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """ "base_interface_AP214" was in the tree, and nothing that was called as the file that had been chosen."""
+    parts = parts_of(glb({"box": [(BOX, RED)]}, [{"name": "base_interface_AP214", "mesh": 0}]), "box")
+    monkeypatch.setattr("studio.project.mesh_import.read_step", lambda file, chord: parts)
+    (mesh,) = import_step(tmp_path / "housing.step", tmp_path, 1e-5)
+    assert (mesh.name, mesh.path) == ("housing", "meshes/housing/housing.ply")
+    made, path = add_parts(Project.load(template_folder("plane") / "project.json"), [mesh])
+    assert value_at(made, path).name == "housing"
+
+
 def test_without_cascadio_the_cure_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"cascadio.*not installed.*blazer-studio\[step\]"):

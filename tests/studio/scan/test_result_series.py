@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,8 +62,6 @@ def test_measured_points_lie_on_the_true_profile_within_their_error(measured) ->
 
 
 def test_a_curve_is_broken_where_the_line_is(measured) -> None:
-    from dataclasses import replace
-
     project, _, curve = measured
     keep = np.r_[0:40, 60 : len(curve.index)]
     cut = replace(curve, **{name: getattr(curve, name)[keep] for name in ("index", "position", "point", "depth_z")})
@@ -109,3 +109,17 @@ def test_the_table_tells_how_well_the_bias_is_known(measured) -> None:
         apart = 2.0 * np.nanstd(error) / np.sqrt(count)
         assert apart <= rows[UNCERTAINTY] < 4.0 * apart
         assert abs(rows["Bias"]) == pytest.approx(abs(np.nanmean(error)))
+
+
+def test_outliers_are_named_by_the_error_that_they_are_of(measured) -> None:
+    """A calibration that is off made "Outliers 100 %" beside a completeness of 95 %, which counts by the image."""
+    _, found, _ = measured
+    off = replace(found, errors=replace(found.errors, depth_z=replace(found.errors.depth_z, outlier_rate=1.0)))
+    named = [{name: values[0] for name, _, values in table([off], view) if "utlier" in name} for view in ERROR_VIEWS]
+    assert [list(one) for one in named] == [
+        ["Outliers of depth"],
+        ["Outliers of the surface"],
+        ["Outliers in the image"],
+    ]
+    assert named[0]["Outliers of depth"] == 100.0
+    assert named[2]["Outliers in the image"] == 100.0 * found.errors.u.outlier_rate < 100.0

@@ -71,6 +71,8 @@ def test_the_measures_of_all_steps_are_those_of_the_scan(scanned: tuple[Path, Pa
         told = {name: values[0] for name, _, values in rows}
         assert methods[0] == row["method"] and len(methods) == 3
         assert told["Points"] == row["points"]
+        # the manifest has those that completeness leaves out, whatever error is looked at
+        assert told["Outliers in the image"] == pytest.approx(100.0 * row["outliers"] / row["points"])
         assert told["RMSE"] == pytest.approx(view.scale * row[key]["rmse"])
         assert told["RMSE"] ** 2 == pytest.approx(told["Bias"] ** 2 + told["Sigma"] ** 2)
 

@@ -137,6 +137,12 @@ def test_a_calibration_that_was_taken_over_since_is_told_without_its_numbers() -
     first = set_apart(study, calibrated(-0.1), study, bases)
     assert [one.rpartition("Laser planes: ")[2] for one in first[:1]] == ["none in the folder, there is one now"]
     assert told_apart(first).count("there is one now") == 2 and "0.97" not in told_apart(first)
+    lens = base.scene.camera
+    camera = {name: getattr(lens, name) for name in ("width", "height", "fx", "fy", "cx", "cy")}
+    with_camera = {"step_block": base.replaced({"calibration.camera": camera}).in_folder(base.folder)}
+    told = told_apart(set_apart(study, with_camera, study, bases))
+    assert "Camera: none in the folder, there is one now" in told and "CalibratedCamera" not in told
+    assert "Camera: one in the folder, none now" in told_apart(set_apart(study, bases, study, with_camera))
     (second,) = set_apart(study, calibrated(-0.2), study, calibrated(-0.1))
     assert second.endswith("Laser planes: another one in the folder")
 

@@ -73,7 +73,8 @@ def test_a_verdict_is_over_all_steps_or_names_its_step(panel: ResultsPanel) -> N
     worst = row["step"] + 1
     assert row["verdict"] != "pass" and row["verdicts"]["pass"] == 2
     shown = [part.table.item(0, column).text() for column in range(4)]
-    assert shown[1:] == [cells(row)[column] for column in (1, 2, 6)]
+    value, *others = (cells(row)[column] for column in (1, 2, 6))
+    assert shown[1:] == [f"{value} (step {worst})", *others]
     assert verdict(panel).endswith(row["verdict"])
     assert cells(row)[5] in part.table.item(0, 4).toolTip(), "as in the report"
     assert f": 2 pass, 1 {row['verdict']}, worst: step {worst} of 3" in cells(row)[5]
@@ -83,6 +84,19 @@ def test_a_verdict_is_over_all_steps_or_names_its_step(panel: ResultsPanel) -> N
     panel.scan_bar.scope.setCurrentIndex(1)
     assert verdict(panel).endswith(f"{gauge.verdict(steps[0].value, steps[0].sigma)}, step 1")
     assert part.told.text().startswith("Of step 1 of 3. All steps, as measured last")
+    assert "(step" not in part.table.item(0, 1).text()
+
+
+def test_what_is_drawn_of_one_step_beside_figures_of_all_names_it(panel: ResultsPanel) -> None:
+    """The table's value was of the worst step, that of the label in 3D of the first, and neither said so."""
+    session, part = panel.session, panel.part
+    part.table.selectRow(0)
+    measures = session.measures_in_3d
+    assert [one.text.split(":")[0] for one in measures] == ["level, step 1"], "a flatness has no lines"
+    assert [item.toPlainText().split(":")[0] for item in part.drawing.texts] == ["level, step 1"]
+    panel.scan_bar.scope.setCurrentIndex(1)
+    assert [one.text.split(":")[0] for one in session.measures_in_3d] == ["level"]
+    assert [item.toPlainText().split(":")[0] for item in part.drawing.texts] == ["level"]
 
 
 def test_counts_of_all_steps_follow_the_tolerance(panel: ResultsPanel) -> None:

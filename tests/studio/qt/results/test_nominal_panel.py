@@ -240,7 +240,7 @@ def test_an_end_of_the_colour_bar_is_dragged_to_another_value(session: Session, 
     view.show()
     cloud = ErrorCloud(session, view)
     bar, (low, high) = cloud.bar, cloud.bar.limits
-    assert low == -high == -cloud.limit and bar.unit == "µm"
+    assert low == -high == -cloud.limit == -10.0 and bar.unit == "mm"
     x, top, tall = bar.bar.center().x(), bar.bar.top(), bar.bar.height()
     qtbot.mousePress(bar, Qt.MouseButton.LeftButton, pos=QPoint(x, top))
     qtbot.mouseMove(bar, QPoint(x, top + round(0.25 * tall)))
@@ -249,8 +249,10 @@ def test_an_end_of_the_colour_bar_is_dragged_to_another_value(session: Session, 
     assert bar.limits == pytest.approx((0.5 * low, 0.5 * high), rel=0.02)
     by_hand = bar.limits
     actions = {action.text(): action for action in bar.menu().actions()}
+    actions["µm"].trigger()
+    assert bar.unit == "µm" and bar.limits == pytest.approx((1e3 * by_hand[0], 1e3 * by_hand[1]))
     actions["mm"].trigger()
-    assert bar.unit == "mm" and bar.limits == pytest.approx((1e-3 * by_hand[0], 1e-3 * by_hand[1]))
+    assert bar.unit == "mm" and bar.limits == pytest.approx(by_hand)
     assert np.nanmax(np.abs(cloud.errors)) < 100.0
     actions["90 % of the points"].trigger()
     assert np.mean(np.abs(cloud.errors[np.isfinite(cloud.errors)]) <= bar.limits[1]) >= 0.9

@@ -24,6 +24,7 @@ from studio.qt.results.heads import CHANGED, STOPPED
 from studio.qt.results.measures_table import MeasuresTable
 from studio.qt.results.readout_panel import ReadoutPanel
 from studio.qt.results.results_panel import ResultsPanel
+from studio.scan.result_series import OUTLIERS
 from studio.scan.stages import scaled
 from tests.studio.qt.small_session import measured_view, small_project, small_render, small_session
 
@@ -172,6 +173,15 @@ def test_large_errors_are_told_in_mm(qtbot: QtBot) -> None:
     )
     told = {made.verticalHeaderItem(i).text(): made.item(i, 0).text() for i in range(3)}
     assert told == {"RMSE / mm": "790", "Bias / µm": "-9999", "Points": "20000"}
+
+
+def test_the_words_of_outliers_say_which_completeness_counts(qtbot: QtBot) -> None:
+    made = MeasuresTable()
+    qtbot.addWidget(made)
+    made.show_measures(["likelihood"], [(name, "%", [50.0]) for name in ("Completeness", *OUTLIERS.values())])
+    tips = [made.verticalHeaderItem(i).toolTip() for i in range(4)]
+    assert "no outlier in the image" in tips[0] and "leaves them out" in tips[3]
+    assert all("Completeness counts them unless" in tip for tip in tips[1:3])
 
 
 @pytest.fixture

@@ -7,8 +7,10 @@ import pytest
 from PySide6.QtCore import QPointF
 from pytestqt.qtbot import QtBot
 
+from studio.qt.results.results_histogram import ErrorHistogram
 from studio.qt.results.results_rows import RowPlots
-from studio.scan.result_series import ERROR_VIEWS, Series
+from studio.qt.results.results_steps import StepsPlot
+from studio.scan.result_series import ERROR_VIEWS, ErrorView, Series
 
 ROWS = np.arange(500.0)
 BAD = {100: -334_000.0, 400: 210.0}
@@ -34,6 +36,27 @@ def test_points_beyond_the_axis_are_crosses_at_its_ends(plots: RowPlots) -> None
     assert dict(zip(x, y, strict=True)) == {100: -plots.limit, 400: plots.limit}
     low, high = plots.error.vb.viewRange()[1]
     assert low < -plots.limit and plots.limit < high < 100.0
+
+
+def test_large_errors_are_drawn_in_mm(qtbot: QtBot) -> None:
+    """The axis had 500k beside a table in mm, and the colours of the points +500000 µm."""
+    plots, histogram, steps = RowPlots(), ErrorHistogram(), StepsPlot()
+    for widget in (plots, histogram, steps):
+        qtbot.addWidget(widget)
+    depth, position, flat = ERROR_VIEWS[0], ERROR_VIEWS[2], np.zeros(len(ROWS))
+    series, error = Series(ROWS, flat, flat, flat, flat), np.full(len(ROWS), 500_000.0)
+
+    def show(view: ErrorView, size: float) -> tuple[list[str], list[float]]:
+        plots.show_series("rows", None, {"likelihood": (series, size * error)}, view)
+        histogram.show_errors({"likelihood": size * error}, view)
+        histogram.mark(size * error[0])
+        steps.show_steps("likelihood", size * error, size * error, view)
+        axes = plots.error.getAxis("left"), histogram.plot.getAxis("bottom"), steps.plot.getAxis("left")
+        return [axis.labelText for axis in axes], [plots.limit, histogram.cursor.value(), steps.rmse.getData()[1][0]]
+
+    assert show(depth, 1.0) == (["Error / mm", "Depth error / mm", "Depth error / mm"], [500.0] * 3)
+    assert show(depth, 0.01) == (["Error / µm", "Depth error / µm", "Depth error / µm"], [5000.0] * 3)
+    assert all(text.endswith("px") for text in show(position, 1.0)[0])
 
 
 def groove() -> Series:

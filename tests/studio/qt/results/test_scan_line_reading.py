@@ -32,6 +32,10 @@ def test_a_point_is_told_with_its_error_or_that_no_truth_is_there() -> None:
     assert "675.000 mm (no truth here)" in reading(1783, peak(PointFlag.OK, 0.675, np.nan), ERROR_VIEWS[0], "rows")[0]
     text, error = reading(1783, peak(PointFlag.OK, 0.675, 2e-5), ERROR_VIEWS[0], "rows")
     assert "675.000 mm (+20" in text and error == pytest.approx(20.0)
+    text, error = reading(1783, peak(PointFlag.OK, 0.675, -0.5), ERROR_VIEWS[0], "rows")
+    assert "675.000 mm (-500 mm)" in text and error == pytest.approx(-500_000.0), (
+        "told in mm, marked in the view's unit"
+    )
 
 
 def test_of_what_is_not_measured_yet_nobody_knows_that_it_has_no_point() -> None:

@@ -331,3 +331,18 @@ def test_a_whole_path_inside_the_projects_folder_is_taken(qtbot: QtBot, session:
         for text in (typed, str(session.document.root / typed)):
             type_into(qtbot, editor, text)
             assert session.project.delivery.logo == editor.text() == kept
+
+
+class TestScrolling:
+    def test_another_item_is_shown_from_its_top_and_an_edit_leaves_its_own_where_it_is(
+        self, qtbot: QtBot, session: Session, inspector: Inspector
+    ) -> None:
+        inspector.window().resize(340, 300)
+        session.select(CAMERA)
+        bar = inspector.area.verticalScrollBar()
+        qtbot.waitUntil(lambda: bar.maximum() > 100)
+        bar.setValue(80)
+        session.set((*CAMERA, "fx"), 1.01 * session.project.scene.camera.fx)
+        assert bar.value() == 80
+        session.select(LASER)
+        assert bar.value() == 0

@@ -315,7 +315,7 @@ class TestDropping:
         """Answer the question about copying, as a person would."""
 
         def answer(box: QMessageBox) -> int:
-            button = next(b for b in box.buttons() if (b.text() == "Copy") == agrees)
+            button = next(b for b in box.buttons() if (b.text() in ("Copy", "Write")) == agrees)
             button.click()
             return 0
 
@@ -348,7 +348,7 @@ class TestDropping:
         assert self.drop(tree, outside.with_suffix(".step"))
         qtbot.waitUntil(lambda: "b" in names(session) and not mesh_importer.running)
         assert names(session) == ["table", "step block", "a", "b"]
-        assert told[-1].startswith("2 parts, 20 x 40 x 60 mm, 24 triangles, closed; facets at most")
+        assert told[-1].startswith("2 parts in meshes/part, 20 x 40 x 60 mm, 24 triangles, closed; facets at most")
         assert LEAST_CHORD <= chords[0] <= LARGEST_CHORD
         session.document.undo()
         assert names(session) == ["table", "step block"]

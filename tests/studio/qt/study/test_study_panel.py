@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,24 @@ class TestDraft:
             field.leave()
         assert [kind for kind, _ in told] == ["warning", "warning"]
         assert all("not a number" in text and text.endswith("The value is as it was") for _, text in told)
+
+    def test_tab_goes_down_the_panel_also_through_what_was_made_later(self, qtbot: QtBot, desk: Desk) -> None:
+        """From the count of a field it went up to the study's name."""
+        desk.vary(POWER[:-1], POWER[-1])
+        desk.vary(NOISE[:1], NOISE[1])
+        panel, rows = desk.panel, desk.panel.editor.rows
+        panel.resize(420, 900)
+        panel.activateWindow()
+        qtbot.waitUntil(panel.isActiveWindow)
+        panel.name.setFocus()
+        passed = [panel.focusWidget()]
+        while passed[-1] is not panel.scale and len(passed) < 40:
+            qtbot.keyClick(passed[-1], Qt.Key.Key_Tab)
+            passed.append(panel.focusWidget())
+        line = [rows[0].kinds, rows[0].low, rows[0].high, rows[0].count, rows[1].kinds]
+        assert [one for one in passed if one in line] == line and passed[-1] is panel.scale
+        middles = [one.mapTo(panel.inside, one.rect().center()).y() for one in passed]
+        assert all(below - above > -6 for above, below in pairwise(middles)), "6 px: beside each other"
 
     def test_a_field_is_varied_once_however_often_it_is_asked_for(self, desk: Desk) -> None:
         desk.vary(NOISE[:1], NOISE[1])

@@ -61,3 +61,27 @@ def test_points_without_an_error_are_white_however_close_they_are(
     made.grow(waves())
     white, dark = (now - then for now, then in zip(counted(), before, strict=True))
     assert white > 4 * dark > 0, "rims are seen about the whole, and in gaps"
+
+
+def test_the_colours_of_large_errors_are_told_in_mm_until_a_person_chooses(small_view: Viewport) -> None:
+    made = ErrorCloud(small_view.session, small_view.view)
+    made.begin_scan(1.0)
+    points = waves()
+    made.grow({**points, "error_depth": np.full(len(points["x"]), 0.5)})
+    bar = made.bar
+    assert (bar.unit, bar.limits) == ("mm", (-500.0, 500.0)) and made.errors[0] == pytest.approx(500.0)
+    bar.scaled.emit(bar.scale.dragged(bar.limits, True, 4.0))
+    assert (bar.unit, bar.limits) == ("mm", (-4.0, 4.0)), "limits by hand stay in the unit that they were set in"
+    actions = {action.text(): action for action in bar.menu().actions()}
+    actions["\u00b5m"].trigger()
+    assert (bar.unit, bar.limits) == ("\u00b5m", (-4000.0, 4000.0))
+    actions["98 % of the points"].trigger()
+    assert (bar.unit, bar.limits) == ("\u00b5m", (-500_000.0, 500_000.0)), "as it was chosen"
+
+
+def test_the_colours_of_small_errors_are_told_in_micrometres(small_view: Viewport) -> None:
+    made = ErrorCloud(small_view.session, small_view.view)
+    made.begin_scan(1.0)
+    points = waves()
+    made.grow({**points, "error_depth": np.full(len(points["x"]), 0.005)})
+    assert (made.bar.unit, made.bar.limits) == ("\u00b5m", (-5000.0, 5000.0))
