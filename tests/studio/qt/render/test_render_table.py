@@ -115,6 +115,27 @@ def test_the_table_says_by_which_settings_its_figures_are(qtbot: QtBot, tmp_path
     table.close()
 
 
+def test_a_kept_render_that_is_open_has_its_own_column_with_the_figures_of_now(qtbot: QtBot, tmp_path: Path) -> None:
+    file = tmp_path / "project.json"
+    project = small_project().save(file)
+    session = Session(Document(project, file))
+    world, frame = small_render()
+    render = Render(1, project, world, frame, name="ball")
+    session.add_render(render)
+    kept = keep_render(session, render, "ball")
+    assert not kept.figures
+    how = development(project, session.project)
+    images = develop_again(frame, how)
+    render.measurements = measure_again(frame, world, how, images, ("likelihood",), cancelled=lambda: False)
+    render.made_from["measurements"] = frame, how
+    table = RenderTable(None, session, [(render, "ball")])
+    qtbot.addWidget(table)
+    (column,) = table.renders
+    assert column.folder == kept.folder and column.figures == as_kept(session, render, "ball").figures
+    table.table.setCurrentCell(0, 0)
+    assert table.open_button.isEnabled()
+
+
 def test_a_column_of_another_scale_is_said_not_to_be_the_scanners(qtbot: QtBot, tmp_path: Path) -> None:
     session = Session(Document(small_project()))
     history = History(session)
