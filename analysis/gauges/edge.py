@@ -1,7 +1,11 @@
 """Where a surface ends along the profile, as at the rim of a hole with upright walls, which have no points themselves.
 
-The edge lies between the last scan line that meets the surface and the next, whatever is seen there, and one place
-between them is as likely as another: it is taken midway, and is uniform over the distance of neighbouring points.
+The edge lies between the last scan line whose middle meets the surface and the next, whatever is seen there, and one
+place between them is as likely as another: it is taken midway, and is uniform over the distance of neighbouring points.
+
+A pixel sees a strip as high as this distance, so that a scan line beyond the edge may have a weaker line of the
+surface: the last strip that is at least half as strong as the others has its middle on it. Where another surface in the
+strip is the stronger one, that is seen in place of it, up to a share of the strip that puts the edge farther out.
 """
 
 from __future__ import annotations
@@ -15,17 +19,22 @@ from numpy.typing import NDArray
 
 from analysis.gauges.fit import OUTLIER_SIGMAS, Fit, Frame, fit, polynomial
 from analysis.gauges.profile import Profile
+from analysis.measures import robust_sigma
 from render.base.arrays import Float
 
 JUMP = 5.0
 """Times the usual distance between neighbouring points, beyond which they are on either side of a jump."""
-JUMP_SIGMAS = 8.0
+JUMP_SIGMAS = 6.0
 """The same in sigmas of a point, which tell jumps from noise where points are close."""
 LONGEST_ALONE = 2
 """Points in a row that are false ones, if a jump leads to them and another back."""
 FEWEST = 4
 """Points of a surface: two for its line, and two to spare."""
 Places = NDArray[np.intp]
+HALF = 0.5
+"""Of the usual strength: of a strip whose middle lies on the edge."""
+BESIDE = 8
+"""Points of a surface beside its edge, whose strength is the usual one."""
 NO_JUMP = (
     "no edge in the region {!r}: its points go on without a jump; drag it over where the surface ends, or, of slanted "
     "walls, take a width"
@@ -46,6 +55,8 @@ class Edge(Fit):
 
     pitch: float
     """m, between neighbouring points along the surface."""
+    unevenness: float = 0.0
+    """Sigma of a strip's strength over it, to which the share of it that is the surface's is known."""
     why: str = ""
     """In words, why there is no edge, in which case the end is NaN; empty: there is one."""
     remark: str = ""
@@ -72,7 +83,8 @@ def edge_of(profile: Profile, part: Float, region: tuple[float, float], name: st
     higher = profile.position[order[k + 1], 1] > profile.position[order[k], 1]
     second = inside[k + 1] and (higher or not inside[k])
     edge, beyond = (k + 1, order[k]) if second else (k, order[k + 1])
-    found = _ending(profile, part, name, *_from_the_edge(order, jump, edge, second))
+    other = order[k::-1] if second else order[k + 1 :]
+    found = _ending(profile, part, name, *_from_the_edge(order, jump, edge, second), other)
     if not found.why and (why := _not_the_end(found, profile, part, int(beyond), name)):
         return _nothing(profile, why)
     return found
@@ -92,8 +104,8 @@ def dimension(edges: Sequence[Edge]) -> Float:
 
 
 def sampling_sigma(edges: Sequence[Edge]) -> float:
-    """m, of the distance between edges that may be anywhere between their scan lines."""
-    return math.hypot(*(one.pitch for one in edges)) / math.sqrt(12.0)
+    """m, of the distance between edges that may be anywhere between their scan lines, if these are known."""
+    return math.hypot(*(one.pitch * math.hypot(1.0 / math.sqrt(12.0), one.unevenness) for one in edges))
 
 
 def _place(edge: Edge, theta: Float) -> Float:
@@ -117,7 +129,20 @@ def _with_neighbours(profile: Profile, part: Float) -> Places:
     order = order[max(inside[0] - 1, 0) : inside[-1] + 2]
     for length in range(1, LONGEST_ALONE + 1):
         order = order[~_alone(profile, order, length)]
-    return order
+    inside = np.flatnonzero(part[order] > 0.0)
+    before, region, after = (
+        np.split(order, [inside[0], inside[-1] + 1]) if len(inside) else (order[:0], order, order[:0])
+    )
+    region = _without_false_end(profile, _without_false_end(profile, region)[::-1])[::-1]
+    return np.concatenate([before, region, after])
+
+
+def _without_false_end(profile: Profile, order: Places) -> Places:
+    """The points less the first few, if a jump leads down from these to the others: of a surface there are more."""
+    jump, _ = _jumps(profile, order)
+    after = np.flatnonzero(jump[:LONGEST_ALONE]) + 1
+    height = profile.position[order, 1]
+    return order[after[0] :] if len(after) and height[after[0] - 1] > height[after[0]] else order
 
 
 def _alone(profile: Profile, order: Places, length: int) -> NDArray[np.bool_]:
@@ -158,8 +183,8 @@ def _from_the_edge(order: Places, jump: NDArray[np.bool_], edge: int, second: bo
     return order[edge::-1], jump[:edge][::-1]
 
 
-def _ending(profile: Profile, part: Float, name: str, order: Places, jump: NDArray[np.bool_]) -> Edge:
-    """The end of the surface whose points, and the jumps after them, begin at the edge."""
+def _ending(profile: Profile, part: Float, name: str, order: Places, jump: NDArray[np.bool_], other: Places) -> Edge:
+    """The end of the surface whose points, and the jumps after them, begin at the edge, as do those of the other."""
     # points of a wall that is seen have jumps on either side
     first = int(np.argmin(jump)) if not jump.all() else len(jump)
     after = np.flatnonzero(jump[first:])
@@ -174,13 +199,46 @@ def _ending(profile: Profile, part: Float, name: str, order: Places, jump: NDArr
     inwards = float(np.median(np.diff(along)))
     reach = _reach(line, profile, surface, abs(inwards))
     on = np.abs(across - line.theta[0] - line.theta[1] * along) <= reach
-    last = int(np.argmax(on))
+    last = int(np.argmax(on & _strong(profile, surface)))
+    share = _share(profile, surface[last:], other)
     gradient = np.zeros((3, *line.gradient.shape[1:]))
     gradient[:2] = line.gradient
     gradient[2, surface[last]] = line.frame.axes[0]
     sigma = abs(float(profile.random[surface[last]] @ line.frame.axes[0]))
-    theta = np.append(line.theta, along[last] - 0.5 * inwards)
-    return Edge(theta, np.append(line.sigma, sigma), gradient, line.here, line.frame, line.ratio, abs(inwards))
+    theta = np.append(line.theta, along[last] - share * inwards)
+    uneven = _unevenness(profile, surface[last:])
+    sigmas = np.append(line.sigma, sigma)
+    return Edge(theta, sigmas, gradient, line.here, line.frame, line.ratio, abs(inwards), uneven)
+
+
+def _strong(profile: Profile, surface: Places) -> NDArray[np.bool_]:
+    """(n,) the points of a surface from its edge that are as strong as where the middle of a strip lies on it."""
+    if profile.strength is None:
+        return np.ones(len(surface), dtype=np.bool_)
+    return ~(profile.strength[surface] < HALF * _strength(profile, surface))
+
+
+def _share(profile: Profile, surface: Places, other: Places) -> float:
+    """Of the distance between points, from the last on a surface to the edge, in the middle of where it may be.
+
+    Of two surfaces in one strip the stronger line is the point's, weighed by how much of the strip is its own.
+    """
+    if profile.strength is None or not len(other) or abs(profile.index[other[0]] - profile.index[surface[0]]) > JUMP:
+        return HALF
+    own, others = (_strength(profile, one) for one in (surface, other))
+    return max(HALF, others / (own + others)) if own + others > 0.0 else HALF
+
+
+def _unevenness(profile: Profile, surface: Places) -> float:
+    if profile.strength is None:
+        return 0.0
+    ratio = profile.strength[surface] / _strength(profile, surface)
+    return min(robust_sigma(ratio), HALF) if np.isfinite(ratio).all() else 0.0
+
+
+def _strength(profile: Profile, order: Places) -> float:
+    assert profile.strength is not None
+    return float(np.median(profile.strength[order[:BESIDE]]))
 
 
 def _reach(line: Fit, profile: Profile, surface: Places, pitch: float) -> float:
@@ -213,7 +271,7 @@ def _where_points_end(profile: Profile, part: Float, region: tuple[float, float]
     if np.count_nonzero(room) != 1:
         return _nothing(profile, (TWO_EDGES if room.any() else NO_JUMP).format(name))
     edge = 0 if room[0] else len(order) - 1
-    found = _ending(profile, part, name, *_from_the_edge(order, jump, edge, bool(room[0])))
+    found = _ending(profile, part, name, *_from_the_edge(order, jump, edge, bool(room[0])), order[:0])
     return replace(found, remark=POINTS_END.format(name))
 
 
@@ -221,4 +279,4 @@ def _nothing(profile: Profile, why: str) -> Edge:
     count = len(profile.index)
     nowhere = Frame(np.zeros(2), np.eye(2))
     gradient, here = np.zeros((3, count, 2)), np.zeros(count, dtype=np.bool_)
-    return Edge(np.full(3, np.nan), np.zeros(3), gradient, here, nowhere, 1.0, math.nan, why)
+    return Edge(np.full(3, np.nan), np.zeros(3), gradient, here, nowhere, 1.0, math.nan, why=why)
