@@ -22,6 +22,7 @@ Kind = Literal[
     "point_to_point",
     "thickness",
     "gap",
+    "edge_to_edge",
     "flush",
     "area",
 ]
@@ -39,6 +40,7 @@ REGIONS: dict[Kind, tuple[str, ...]] = {
     "point_to_point": ("first point", "second point"),
     "thickness": ("datum", "surface"),
     "gap": ("left edge", "right edge"),
+    "edge_to_edge": ("first edge", "second edge"),
     "flush": ("first sheet", "second sheet"),
     "area": ("reference", "section"),
 }
@@ -56,10 +58,11 @@ TITLES: dict[Kind, str] = {
     "point_to_point": "Point to point",
     "thickness": "Thickness",
     "gap": "Gap",
+    "edge_to_edge": "Edge to edge (of a hole, slot or plate)",
     "flush": "Flush",
     "area": "Area",
 }
-NEVER_NEGATIVE = ("width", "opening", "radius", "flatness", "point_to_point")
+NEVER_NEGATIVE = ("width", "opening", "radius", "flatness", "point_to_point", "edge_to_edge")
 """Kinds whose lower limit of 0, as drawings have it, is kept by every part, however uncertain the value is."""
 MOST_GAUGES = 64
 Place = Annotated[float, Field(ge=-100.0, le=100.0)]

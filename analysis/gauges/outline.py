@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.gauges.area import section, section_points, without_unsure
+from analysis.gauges.edge import Edge, dimension
 from analysis.gauges.fit import Fit
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.profile import Profile
@@ -46,7 +47,8 @@ def outline(gauge: Gauge, profile: Profile) -> tuple[list[Float], Float]:
         case "area":
             return _area(fits[0], gauge.regions[1], profile)
     curves = [_polynomial(one, *_span(one, profile, one.here)) for one in fits]
-    return curves, _between_lines(gauge, fits)
+    edges = [one for one in fits if isinstance(one, Edge)]
+    return curves, dimension(edges) if edges else _between_lines(gauge, fits)
 
 
 def _span(one: Fit, profile: Profile, here: NDArray[np.bool_]) -> tuple[float, float]:
@@ -56,8 +58,9 @@ def _span(one: Fit, profile: Profile, here: NDArray[np.bool_]) -> tuple[float, f
 
 
 def _polynomial(one: Fit, low: float, high: float) -> Float:
-    along = np.linspace(low, high, 2 if len(one.theta) == 2 else ARC_POINTS)
-    return one.frame.out(np.column_stack([along, np.polynomial.polynomial.polyval(along, one.theta)]))
+    theta = one.theta[:2] if isinstance(one, Edge) else one.theta
+    along = np.linspace(low, high, 2 if len(theta) == 2 else ARC_POINTS)
+    return one.frame.out(np.column_stack([along, np.polynomial.polynomial.polyval(along, theta)]))
 
 
 def _levels(one: Fit, profile: Profile, parts: list[Float]) -> tuple[list[Float], Float]:

@@ -54,6 +54,8 @@ class Profile:
     normal: Float | None = None
     """(m, 3) unit, in the section's frame: of the true surface there, NaN where it is unknown; None: everywhere."""
     section: Section = Section()
+    strength: Float | None = None
+    """(m,) electrons at the line's peak; None: a point is of its scan line's middle alone, as on the exact line."""
     fitted: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     """The curves that were fitted to it so far, for whoever reads and then draws them; by kind and regions."""
 
@@ -76,6 +78,7 @@ class Profile:
             None if self.place is None else self.place[here],
             None if self.normal is None else self.normal[here],
             self.section,
+            None if self.strength is None else self.strength[here],
         )
 
     def whitening(self) -> tuple[Float, Float]:
@@ -109,9 +112,15 @@ class Profile:
 
 
 def measured_profile(
-    points: Points, errors: Errors | None, T_section_camera: Float, section: Section = Section()
+    points: Points,
+    errors: Errors | None,
+    T_section_camera: Float,
+    section: Section = Section(),
+    strength: Float | None = None,
 ) -> Profile:
     """Profile of the points that have coordinates and a sigma, in the y and z of a section: a laser's plane or another.
+
+    strength: of each of the points, as of `Profile`.
 
     With `errors`, what the sheet's own width moves the line by, known from the truth, counts as one systematic error.
     """
@@ -134,6 +143,7 @@ def measured_profile(
         place=place,
         normal=normal,
         section=section,
+        strength=None if strength is None else strength[order],
     )
 
 

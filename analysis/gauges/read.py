@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.gauges.area import area_above, section, unseen, without_unsure
+from analysis.gauges.edge import NOT_IN_TRUTH, Edge, between_edges, edge_of, sampling_sigma
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, Gauge, Verdict
 from analysis.gauges.oblique import (
@@ -34,7 +35,9 @@ OTHER_SHAPE = (
 )
 MISFITS = {
     "peak": "points miss its parabola by {:.0f} times their sigma: value and truth may be off the top; of a flat one "
-    "take a step height, else a narrower region"
+    "take a step height, else a narrower region",
+    "edge_to_edge": "points miss the straight line of a surface that ends there by {:.0f} times their sigma: where it "
+    "is no plane, take regions that reach less far from its edge",
 }
 MANY = 0.1
 """Of a region's points, from which on it is told that its curve leaves so many out."""
@@ -42,6 +45,10 @@ LEFT_OUT = "{} of the {} points miss the curve in the region {!r} by far and are
 SWAPPED = "the region {!r} lies on the right of {!r}: drag the two anew, or give their ends anew"
 STRAY = "the exact line does not reach its regions: the value is of stray light or noise"
 NO_TRUTH = "; the exact line does not reach there either, so that the area has no truth"
+AS_DRAGGED = (
+    "its ends are the middles of its regions, where they were put: along the profile nothing is measured; of edges "
+    "take Edge to edge"
+)
 STRAIGHTEST = 10.0
 """Lengths of its region, of the radius of an edge: beyond, the points are those of a flat side."""
 SPARE = 2
@@ -59,7 +66,7 @@ class Reading:
     """None: of all steps."""
     value: float = NAN
     sigma_random: float = NAN
-    """Of the line's position in the image, with its correlation along the line."""
+    """Of the line's position in the image, with its correlation along the line, and of edges between scan lines."""
     sigma_systematic: float = NAN
     """Of what all points share: calibration, and the sheet's own width where the truth tells it."""
     points: int = 0
@@ -109,17 +116,31 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
     used = np.count_nonzero(np.any([one.here for one in fits], axis=0))
     ratio = max(one.ratio for one in fits)
     true, remark = _true_value(gauge, truth), ""
+    random *= ratio
+    edges = [one for one in fits if isinstance(one, Edge)]
     if gauge.kind == "area":
         hidden = unseen(measured, gauge.regions[1], fits[0].frame)
         systematic, remark = math.hypot(systematic, hidden.sigma), hidden.remark
         remark += NO_TRUTH if remark and math.isnan(true) else ""
     elif truth is not None and isinstance(parts_of(gauge, truth), str):
         remark = STRAY
+    elif edges:
+        random = math.hypot(random, sampling_sigma(edges))
+        seen = "; ".join(one.remark for one in edges if one.remark)
+        remark = NOT_IN_TRUTH if truth is not None and math.isnan(true) else seen
     if not remark and ratio > MISFIT:
         remark = MISFITS.get(gauge.kind, OTHER_SHAPE).format(ratio)
     remark = remark or _swapped(gauge) or _left_out(gauge, measured, fits)
-    one = Reading(gauge, step, value, ratio * random, systematic, int(used), true, "", remark)
+    if gauge.kind == "point_to_point" and value < math.sqrt(2.0) * _between_middles(gauge):
+        remark = f"{remark}; {AS_DRAGGED}" if remark else AS_DRAGGED
+    one = Reading(gauge, step, value, random, systematic, int(used), true, "", remark)
     return replace(_beside_square(one, measured), section=measured.section.name)
+
+
+def _between_middles(gauge: Gauge) -> float:
+    """m, across the fan, of the two regions."""
+    (low, high), (other_low, other_high) = gauge.regions
+    return 0.5 * abs(other_low + other_high - low - high)
 
 
 def _swapped(gauge: Gauge) -> str:
@@ -133,8 +154,8 @@ def _left_out(gauge: Gauge, profile: Profile, fits: Sequence[Fit]) -> str:
     """In words, of which region many points are not in the curve; empty: of none."""
     told, most = "", MANY
     for k, (name, region) in enumerate(zip(REGIONS[gauge.kind], gauge.regions, strict=True)):
-        if gauge.kind != "step" and k >= len(fits):
-            continue  # of the second region of an area no curve is fitted
+        if (gauge.kind != "step" and k >= len(fits)) or gauge.kind == "edge_to_edge":
+            continue  # of the second region of an area no curve is fitted, and an edge is to be reached over
         there = profile.weight(*region) > 0.0
         of_all, missing = np.count_nonzero(there), np.count_nonzero(there & ~fits[min(k, len(fits) - 1)].here)
         if missing > most * of_all:
@@ -239,7 +260,8 @@ def _value(gauge: Gauge, profile: Profile) -> tuple[float, Float, list[Fit]] | s
 NOTHING = {
     "peak": "the profile has no peak within its region; of a flat top take a step height",
     "radius": "no circle fits the points",
-    "gap": "its regions hold no round edges; drag over where each edge turns down, or take a width",
+    "gap": "its regions hold no round edges; drag over where each edge turns down; between upright walls take Edge "
+    "to edge, between slanted ones a width",
     "area": "its points end before the section does",
     "step": "no two levels fit the points",
 }
@@ -285,6 +307,10 @@ def _fitted(gauge: Gauge, profile: Profile, parts: list[Float]) -> tuple[list[Fi
             low, high = section(gauge.regions[1], line.frame)
             below = np.array([high - low, 0.5 * (high**2 - low**2)])  # of a line, by its constant and its slope
             return [line, above], lambda theta: float(theta[1][0] - below @ theta[0])
+        case "edge_to_edge":
+            asked = zip(parts, gauge.regions, REGIONS[gauge.kind], strict=True)
+            ends = [edge_of(profile, *one) for one in asked]
+            return list(ends), lambda theta: between_edges(ends, theta)
         case _:
             fits = [_polynomial(profile, part, 1) for part in parts]
             return fits, lambda theta: _of_lines(gauge, [line_of(*pair) for pair in zip(fits, theta, strict=True)])

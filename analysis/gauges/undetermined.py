@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from analysis.gauges.edge import Edge
 from analysis.gauges.fit import Fit
 from analysis.gauges.gauge import REGIONS, Gauge
 
@@ -16,9 +17,13 @@ STRAIGHTEST = 1000.0
 CROSSINGS: dict[str, tuple[tuple[int, int], ...]] = {"width": ((0, 1), (0, 2)), "v_depth": ((1, 2),)}
 """Kind -> which of its lines are brought to where they cross."""
 
+UPRIGHT = "; between upright walls, which have no points, take Edge to edge"
+
 
 def undetermined(gauge: Gauge, fits: list[Fit]) -> str:
     """Why the curves give no value, or nothing."""
+    if missing := [one.why for one in fits if isinstance(one, Edge) and one.why]:
+        return "; ".join(missing)
     if gauge.kind == "radius":
         low, high = gauge.regions[0]
         radius, sigma = abs(float(fits[0].theta[2])), fits[0].ratio * float(fits[0].sigma[2])
@@ -27,7 +32,8 @@ def undetermined(gauge: Gauge, fits: list[Fit]) -> str:
     for first, second in CROSSINGS.get(gauge.kind, ()):
         names = " and ".join(repr(REGIONS[gauge.kind][one]) for one in (first, second))
         if _angle(fits[first], fits[second]) < LEAST_SIGMAS * _sigma_of_angle(fits[first], fits[second]):
-            return f"{names} are parallel as far as their points can tell, and cross nowhere in particular"
+            told = f"{names} are parallel as far as their points can tell, and cross nowhere in particular"
+            return told + UPRIGHT if gauge.kind == "width" else told
     return ""
 
 

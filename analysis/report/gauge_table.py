@@ -17,6 +17,8 @@ MARKS = {"pass": "✓\u00a0pass", "fail": "✗\u00a0fail", "undecided": "?\u00a0
 """Never by colour alone."""
 MISSES = "points miss "
 """How remarks begin that the points are not of the fitted curve, with what else is told before them."""
+PUT = "ends are the middles of its regions"
+"""What remarks hold whose value is for the most part where the regions were put."""
 COUNTED = ("pass", "undecided", "fail", "no tolerance", "none")
 """Verdicts in the order in which their counts are told; the last: not measured."""
 PLAIN = str.maketrans({"µ": "u", "²": "2", "°": " deg", "–": "-", "✓": "", "✗": "", "?": "", "\u00a0": " "})  # noqa: RUF001
@@ -25,8 +27,11 @@ DEFINITIONS: dict[Kind, str] = {
     "stands over the line between its ends, signed; waves and roughness do not count, as they do by ISO 1101.",
     "flatness": "Flatness here is the form of second degree (bow and twist) that is fitted to the surface, from peak "
     "to valley over its least-squares plane; waves, dents and roughness do not count, as they do by ISO 1101.",
+    "edge_to_edge": "Edge to edge: each edge lies midway between the last scan line on the surface that ends there and "
+    "the next, and unsure by half their distance either way, as its sigma says; the truth is of the same scan lines, "
+    "so that the error may be 0 all the same. Scan lines that are closer tell it better.",
 }
-"""Of kinds whose name a drawing means otherwise, by a sentence each."""
+"""Of kinds whose name a drawing means otherwise, or whose error does not tell all, in a few words each."""
 OPPOSITE = 0.02
 """Of a nominal, by which a value may differ that is taken for it with the other sign."""
 FEWEST, MOST = 2, 6
@@ -127,7 +132,7 @@ def worst_of(row: Mapping[str, Any]) -> str:
 
 def marked_verdict(row: Mapping[str, Any]) -> str:
     """Of such an entry that has a value, with what is amiss with it."""
-    return verdict_text(row["verdict"], row.get("oblique"), MISSES in (row.get("remark") or ""))
+    return verdict_text(row["verdict"], row.get("oblique"), row.get("remark") or "")
 
 
 def label_of(one: Reading, step: str = "") -> str:
@@ -135,20 +140,22 @@ def label_of(one: Reading, step: str = "") -> str:
 
     step: which it is of, where that is to be told; of a measure of all steps together it is not.
     """
-    told = verdict_text(one.verdict, one.oblique, MISSES in one.remark)
+    told = verdict_text(one.verdict, one.oblique, one.remark)
     name = f"{one.gauge.name}, {step}" if step and not one.gauge.of_scan else one.gauge.name
     value = f"{name}: {value_text(one.value, one.sigma, one.gauge.unit)}"
     return value if told == NONE else f"{value}, {told}"
 
 
-def verdict_text(verdict: str | None, oblique: float | None = None, misfit: bool = False) -> str:
-    """With its mark, by how much its section is not square to its faces (rad, None or NaN for nothing), and whether its
-    points miss the fitted curve."""
+def verdict_text(verdict: str | None, oblique: float | None = None, remark: str = "") -> str:
+    """With its mark, by how much its section is not square to its faces (rad, None or NaN for nothing), and what its
+    remark says: that its points miss the fitted curve, or that its regions were put where it ends."""
     told = [MARKS[verdict]] if verdict else []
     if oblique is not None and math.isfinite(oblique):
         told.append(f"{math.degrees(oblique):.1f}° oblique")
-    if misfit:
+    if MISSES in remark:
         told.append("misfit")
+    if PUT in remark:
+        told.append("as dragged")
     return ", ".join(told) or NONE
 
 

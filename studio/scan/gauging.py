@@ -36,9 +36,9 @@ FIGURES = ("value", "sigma_random", "sigma_systematic", "sigma", "truth", "error
 def profiles(project: Project, frame: Frame, found: Measurement, section: ProfileSection) -> tuple[Profile, Profile]:
     """Measured and exact profile of a laser, in a section."""
     T = T_section_camera(project.scene, found.laser, frame.step, section)
-    measured = measured_profile(
-        found.points, found.errors, T, section_of(project.scene, found.laser, frame.step, section)
-    )
+    strength = found.line.amplitude[found.points.index, found.points.rank]
+    name = section_of(project.scene, found.laser, frame.step, section)
+    measured = measured_profile(found.points, found.errors, T, name, strength)
     return measured, true_profile(frame.curves[found.laser], T, measured)
 
 

@@ -23,6 +23,7 @@ REGION = {
     "point_to_point": ((-0.015, -0.013), (0.009, 0.011)),
     "thickness": ((-0.015, -0.003), (0.003, 0.015)),
     "gap": ((-0.0115, -0.0065), (0.0065, 0.0115)),
+    "edge_to_edge": ((-0.009, -0.001), (0.001, 0.009)),
     "flush": ((-0.015, -0.003), (0.003, 0.015)),
     "area": ((0.012, 0.02), (-0.009, -0.002)),
 }
@@ -54,6 +55,8 @@ def shape(kind: str) -> tuple[np.ndarray, float]:
             return far + np.where(x > 0.0, 0.002 + 0.12 * x, 0.1 * x), (0.002 + 0.02 * at) / np.sqrt(1.01)
         case "gap":
             return far + np.sqrt(0.004**2 - np.minimum((np.abs(x) - 0.009) ** 2, 0.0039**2)), 0.01
+        case "edge_to_edge":  # its edges lie midway between points
+            return slot(-0.005, 0.005), 0.01 * np.sqrt(1.01)
         case "v_depth":
             return far + groove, 0.01
         case "radius":
@@ -64,6 +67,16 @@ def shape(kind: str) -> tuple[np.ndarray, float]:
             return far - BENT * x**2, BENT * 0.01**2
         case _:
             return far + 0.3 * x, 0.024 * np.sqrt(1.09)
+
+
+def between(first: float, second: float) -> np.ndarray:
+    """Which of ACROSS lie between two places, m."""
+    return np.abs(ACROSS - 0.5 * (first + second)) < 0.5 * (second - first)
+
+
+def slot(first: float, second: float, depth: float = 0.01) -> np.ndarray:
+    """Heights at ACROSS of a slot with upright walls at two places, in a face of slope 0.1."""
+    return -0.5 + 0.1 * ACROSS - depth * between(first, second)
 
 
 def profile(

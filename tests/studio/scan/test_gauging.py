@@ -17,18 +17,23 @@ from analysis.gauges.read import MISFITS, OTHER_SHAPE, Reading
 from analysis.report.gauge_table import cells, reasons, worst_of
 from analysis.report.units import NONE
 from render.base.errors import InputError
+from render.run import Run
+from render.world.world import build_world
 from studio.project.project import Project
 from studio.scan.gauging import (
     judged_over_steps,
     kept_readings,
     measures_record,
+    profiles,
     read_each,
     step_readings,
     verdict_counts,
     worst,
     write_measures,
 )
+from studio.scan.line_extraction import extract_line
 from studio.scan.scan_folder import measured_project, open_folder
+from studio.scan.stages import Clock, Measurement, compare_points, develop_step, render_step, triangulate_line
 from tests.studio.small_scan import scan, small_project
 
 FLAT = {"kind": "straightness", "regions": [[-0.08, 0.08]]}
@@ -73,6 +78,21 @@ def test_every_row_says_in_which_section_it_was_read(scanned: Path, tmp_path: Pa
     call("reconstruct", scanned, "--project", file, "--out", tmp_path)
     assert {row["section"] for row in table(tmp_path)} == {"in a section across Y"}
     assert (tmp_path / "measures.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",remark,section")
+
+
+def test_a_profile_knows_how_strong_its_line_is_and_the_exact_one_is_of_the_middles_of_scan_lines(
+    tmp_path: Path,
+) -> None:
+    project, clock = Project.load(small_project(tmp_path)), Clock(lambda stage, done: None, lambda: False)
+    world = build_world(project.scene, tmp_path, 0)
+    frame = render_step(project, world, 0, clock, Run(threads=2))
+    image = develop_step(project, frame, clock, 2)[0]
+    line = extract_line(project, image, 0)
+    points = triangulate_line(project, line, 0, 0)
+    errors = compare_points(project, frame, world, points, line, 0)
+    measured, exact = profiles(project, frame, Measurement(0, 0, image, line, points, errors), "laser_plane")
+    assert measured.strength is not None and exact.strength is None
+    assert measured.strength == pytest.approx(line.amplitude[measured.index, 0]) and len(measured.index) > 20
 
 
 def table(folder: Path) -> list[dict[str, str]]:
