@@ -116,8 +116,8 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
     used = np.count_nonzero(np.any([one.here for one in fits], axis=0))
     ratio = max(one.ratio for one in fits)
     true, remark = _true_value(gauge, truth), ""
-    random *= ratio
     edges = [one for one in fits if isinstance(one, Edge)]
+    random = math.hypot(ratio * random, sampling_sigma(edges) if edges else 0.0)
     if gauge.kind == "area":
         hidden = unseen(measured, gauge.regions[1], fits[0].frame)
         systematic, remark = math.hypot(systematic, hidden.sigma), hidden.remark
@@ -125,7 +125,6 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
     elif truth is not None and isinstance(parts_of(gauge, truth), str):
         remark = STRAY
     elif edges:
-        random = math.hypot(random, sampling_sigma(edges))
         seen = "; ".join(one.remark for one in edges if one.remark)
         remark = NOT_IN_TRUTH if truth is not None and math.isnan(true) else seen
     if not remark and ratio > MISFIT:

@@ -122,6 +122,8 @@ def test_a_region_over_a_whole_hole_says_that_it_has_two_edges() -> None:
 def test_points_that_are_missing_on_a_part_that_goes_on_are_told_to_be_no_edges() -> None:
     dark = profile(FLAT).taken(np.abs(ACROSS) > 0.005)
     assert "the points end there, and not the part" in read(SLOT, 0, dark, profile(FLAT)).remark
+    nowhere = profile(FLAT).taken(ACROSS > 0.015)
+    assert read(SLOT, 0, dark, nowhere).sigma == read(SLOT, 0, dark, profile(FLAT)).sigma > 0.4 * PITCH
 
 
 def test_noise_alone_makes_no_edges_where_points_are_close() -> None:
