@@ -83,6 +83,27 @@ def styled(qapp: QApplication) -> None:
 
 
 @pytest.fixture(autouse=True)
+def no_question_is_left(qapp: QApplication) -> Iterator[None]:
+    """A dialog that waits for a person would wait for ever: it is closed, and its test fails by its name."""
+    from PySide6.QtCore import QTimer
+
+    asked: list[str] = []
+    timer = QTimer(interval=PATIENCE_MS)
+
+    def give_up() -> None:
+        waiting = qapp.activeModalWidget()
+        if waiting is not None:
+            asked.append(waiting.objectName() or waiting.windowTitle())
+            waiting.close()
+
+    timer.timeout.connect(give_up)
+    timer.start()
+    yield
+    timer.stop()
+    assert not asked, f"nobody answered {', '.join(asked)}"
+
+
+@pytest.fixture(autouse=True)
 def no_thread_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
     """A job that outlives its window would crash later, in a test that has nothing to do with it."""
     before = set(threading.enumerate())
