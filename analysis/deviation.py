@@ -44,6 +44,7 @@ NEIGHBOURS = 5
 """Points, itself among them, whose median tells whether a point stands alone."""
 SMALL = 0.25
 JUMP, GRAZING = 3.0, 0.1
+"""Of `unsure_of_place`."""
 
 
 def far_off(value: Float) -> NDArray[np.bool_]:

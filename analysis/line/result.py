@@ -146,6 +146,13 @@ NUMBERS = ("u", "sigma_u", "width", "amplitude", "background", "chi2", "length_a
 """Of a line, (n, k) each or None."""
 
 
+def exact_line(axis: Axis, position: Float) -> Line:
+    """Peaks at positions (n, k) px that are known without error; NaN where there is none."""
+    known = np.where(np.isfinite(position), 1.0, np.nan)
+    flag = np.where(np.isfinite(position), Flag.OK, Flag.NO_PEAK).astype(np.uint8)
+    return Line(axis, "likelihood", position, 0.0 * known, known, known, known, known, flag)
+
+
 def side_by_side(lines: Sequence[Line]) -> Line:
     """Lines (n, k), (n, m) .. of the same scan lines -> (n, k + m ..), in all else the first one."""
     together: dict[str, Any] = {"flag": np.concatenate([one.flag for one in lines], axis=1)}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.line.result import Flag, Line
+from analysis.line.result import exact_line
 from analysis.report.colour import DIVERGING
 from analysis.report.style import figure, png_uri
 from analysis.report.units import micrometres
@@ -112,9 +112,7 @@ def depth_map(found: FoundCalibration, scene: Scene, laser: int, depths: Float) 
     v = np.rint(np.linspace(0.0, camera.height - 1.0, DOWN)).astype(int)
     place = np.full((camera.height, ACROSS), np.nan)
     place[v] = u
-    known = np.where(np.isfinite(place), 1.0, np.nan)
-    flag = np.where(np.isfinite(place), Flag.OK, Flag.NO_PEAK).astype(np.uint8)
-    line = Line("rows", "likelihood", place, 0.0 * known, known, known, known, known, flag)
+    line = exact_line("rows", place)
     sigma, depth = np.full((DOWN, ACROSS), np.nan), [np.full((DOWN, ACROSS), np.nan) for _ in range(2)]
     ways = ((camera, found.planes[laser], found.covariances[laser]), (scene.camera, scene.laser_plane(laser), None))
     for values, (lens, plane, covariance) in zip(depth, ways, strict=True):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.line.result import Flag, Line
+from analysis.line.result import exact_line
 from analysis.triangulate import triangulate
 from render.base.arrays import Float
 from studio.project.project import Project
@@ -44,9 +44,7 @@ def calibration_fit(
     rows = project.extraction.axis == "rows"
     place = np.full((scene.camera.height if rows else scene.camera.width, 1), np.nan)
     place[index, 0] = position[first]
-    known = np.where(np.isfinite(place), 1.0, np.nan)
-    flag = np.where(np.isfinite(place), Flag.OK, Flag.NO_PEAK).astype(np.uint8)
-    line = Line(project.extraction.axis, "likelihood", place, 0.0 * known, known, known, known, known, flag)
+    line = exact_line(project.extraction.axis, place)
     exact, camera = scene.laser_plane(laser), scene.camera
     ways = (
         (given.camera_of(camera), given.plane(laser, exact), given.covariance(laser)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from render.base.errors import InputError
+from render.base.files import sha256
 from studio.project.project import Project
 from studio.project.validation_messages import input_error
 
@@ -127,11 +127,11 @@ class Document:
             listener()
 
 
-def _digest(path: Path | None) -> bytes | None:
+def _digest(path: Path | None) -> str | None:
     """Of a file's bytes; None: there is none, or it cannot be read."""
     try:
-        return None if path is None else hashlib.sha256(path.read_bytes()).digest()
-    except OSError:
+        return None if path is None else sha256(path)
+    except InputError:
         return None
 
 

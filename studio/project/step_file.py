@@ -17,8 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from render.base.arrays import Float
 from render.base.errors import InputError
@@ -96,6 +94,9 @@ def read_step(file: Path, chord: float) -> list[Part]:
 
 def _shells(parts: Sequence[Part]) -> int:
     """How many pieces of surface do not touch, in parts that are no copies of one another."""
+    from scipy.sparse import coo_array  # takes a while: not before a file is read
+    from scipy.sparse.csgraph import connected_components
+
     models = {part.model: part for part in parts}
     return sum(
         connected_components(coo_array((np.ones(len(t)), (t[:, 0], t[:, 1])), shape=(n, n)), directed=False)[0]

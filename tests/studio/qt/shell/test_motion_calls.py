@@ -68,15 +68,23 @@ def test_a_scan_that_was_stopped_goes_on_as_the_message_says(
     assert not command.isEnabled(), "another project was opened"
 
 
-def test_the_frames_that_are_there_do_not_foretell_the_time_left(
-    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def endless(window: MainWindow, monkeypatch: pytest.MonkeyPatch) -> MotionPanel:
+    """Its scans run until they are cancelled."""
+
     def scan(*_: object, listener: Listener, **__: object) -> None:
         until_cancelled(listener.progress, listener.cancelled)
 
     monkeypatch.setattr("studio.scan.scan.run_scan", scan)
     motion = window.panels["motion"]
     assert isinstance(motion, MotionPanel)
+    return motion
+
+
+def test_the_frames_that_are_there_do_not_foretell_the_time_left(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path, endless: MotionPanel
+) -> None:
+    motion = endless
     window.session.set(("scene", "motion"), LinearStage(step=(0.001, 0.0, 0.0), steps=4))
     for expected in (0.0, motion_panel.share(FRAMES, 0.5)):
         job = motion.run_into(tmp_path) if motion.stopped is None else motion.resume()
@@ -161,14 +169,9 @@ def test_it_is_asked_whether_other_settings_go_on(
 
 
 def test_a_scan_under_way_says_that_it_is_of_other_settings(
-    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    window: MainWindow, qtbot: QtBot, tmp_path: Path, endless: MotionPanel
 ) -> None:
-    def scan(*_: object, listener: Listener, **__: object) -> None:
-        until_cancelled(listener.progress, listener.cancelled)
-
-    monkeypatch.setattr("studio.scan.scan.run_scan", scan)
-    motion = window.panels["motion"]
-    assert isinstance(motion, MotionPanel)
+    motion = endless
     window.session.set(("scene", "motion"), LinearStage(step=(0.0, 0.005, 0.0), steps=20))
     motion.run_into(tmp_path)
     window.session.set(("scene", "motion", "steps"), 9)
