@@ -218,9 +218,9 @@ def _placed(scene: Any, where: str) -> list[Part]:
 
 
 def _differs_from_facets(vertices: Float, triangles: NDArray[np.int64], normals: Float) -> bool:
-    """Whether any corner's vertex normal is more than 1 degree off its facet's."""
+    """Whether any corner's vertex normal is more than 0.1 degrees off its facet's, which three digits may be."""
     corners = vertices[triangles]
     facet = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     dot = np.einsum("tk,tck->tc", facet, normals[triangles])
     lengths = np.linalg.norm(facet, axis=1)[:, None] * np.linalg.norm(normals, axis=1)[triangles]
-    return bool((dot < np.cos(np.radians(1.0)) * lengths).any())
+    return bool((dot < np.cos(np.radians(0.1)) * lengths).any())

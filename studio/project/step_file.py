@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import math
 import os
 import re
 import subprocess
@@ -30,6 +31,8 @@ PATIENCE = 300.0
 """Seconds for one file."""
 DARKEST = 0.02
 """A part that is drawn black still reflects."""
+LARGEST_TURN = math.radians(45.0)
+"""Of a surface within a facet. A normal that is farther off is undefined, as at the tip of a cone."""
 SOLID = re.compile(rb"=\s*(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
 QUICK, THOROUGH = "delabella", "watson"
 """Triangulations of OpenCASCADE. The first is up to eight times quicker and makes the same facets, but may leave a face
@@ -53,6 +56,8 @@ class Part:
     """(v, 3) m, each place once."""
     triangles: NDArray[np.int64]
     """(t, 3)."""
+    normals: Float
+    """(t, 3, 3) unit normals of the true surface at the corners of its facets."""
     colour: tuple[float, float, float] | None
     """Linear reflectance, mean over the part's faces; None: the file has none."""
     closed: bool
@@ -167,11 +172,13 @@ def parts_of(data: bytes, where: str) -> list[Part]:
 def _part(name: str, faces: Sequence[tuple[Float, Any]], model: str) -> Part:
     import trimesh
 
-    corners, colours = [], []
+    corners, turned, colours = [], [], []
     for _, geometry in faces:
         # places are told apart before they are moved, as rounding would part those that faces share
         local = np.asarray(geometry.vertices)[np.asarray(geometry.faces)]
         corners.append(local)
+        # trimesh makes up normals that the file lacks
+        turned.append(np.asarray(geometry.vertex_normals)[np.asarray(geometry.faces)])
         factor = getattr(getattr(geometry.visual, "material", None), "baseColorFactor", None)
         if factor is not None:
             area = float(np.linalg.norm(np.cross(local[:, 1] - local[:, 0], local[:, 2] - local[:, 0]), axis=1).sum())
@@ -180,21 +187,37 @@ def _part(name: str, faces: Sequence[tuple[Float, Any]], model: str) -> Part:
     places, at = np.unique(together, axis=0, return_inverse=True)
     triangles = np.asarray(at.reshape(-1, 3), dtype=np.int64)
     a, b, c = triangles.T
-    triangles = triangles[(a != b) & (b != c) & (c != a)]
+    kept = (a != b) & (b != c) & (c != a)
+    triangles, normals = triangles[kept], np.concatenate(turned)[kept]
     matrix = faces[0][0]
     if np.linalg.det(matrix[:3, :3]) < 0.0:  # a mirror turns counter-clockwise into clockwise
-        triangles = triangles[:, ::-1]
+        triangles, normals = triangles[:, ::-1], normals[:, ::-1]
+    vertices = places @ matrix[:3, :3].T + matrix[:3, 3]
+    normals = _of_surface(normals @ np.linalg.inv(matrix[:3, :3]), vertices[triangles])
     colour = None
     if colours and sum(area for area, _ in colours) > 0.0:
         mean = np.average([one for _, one in colours], axis=0, weights=[area for area, _ in colours])
         red, green, blue = np.clip(mean, DARKEST, 1.0).round(4).tolist()
         colour = (red, green, blue)
     closed = bool(trimesh.Trimesh(places, triangles, process=False).is_watertight)
-    return Part(name, places @ matrix[:3, :3].T + matrix[:3, 3], triangles, colour, closed, model)
+    return Part(name, vertices, triangles, normals, colour, closed, model)
+
+
+def _of_surface(normals: Float, corners: Float) -> Float:
+    """(t, 3, 3) normals of facets with these corners, of unit length; the facet's own where they are undefined."""
+    facets = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        facets = facets / np.linalg.norm(facets, axis=2, keepdims=True)
+        unit = normals / np.linalg.norm(normals, axis=2, keepdims=True)
+    near = (unit * facets).sum(axis=2, keepdims=True) >= math.cos(LARGEST_TURN)
+    return np.asarray(np.where(near, unit, facets))
 
 
 def write_parts(parts: Sequence[Part], folder: Path, made: list[Path]) -> list[Path]:
-    """Each part as a PLY in mm in a folder that is new; `made` grows by what was written. InputError: cannot be."""
+    """Each part as a PLY in mm in a folder that is new; `made` grows by what was written. InputError: cannot be.
+
+    A place has a vertex for each normal that its facets have there.
+    """
     import trimesh
 
     files = []
@@ -204,7 +227,10 @@ def write_parts(parts: Sequence[Part], folder: Path, made: list[Path]) -> list[P
         while target in files:
             number += 1
             target = folder / f"{stem} {number}.ply"
-        data = trimesh.Trimesh(part.vertices * 1e3, part.triangles, process=False).export(file_type="ply")
+        both = np.concatenate([part.vertices[part.triangles] * 1e3, part.normals], axis=2).astype(np.float32)
+        vertices, at = np.unique(both.reshape(-1, 6), axis=0, return_inverse=True)
+        mesh = trimesh.Trimesh(vertices[:, :3], at.reshape(-1, 3), vertex_normals=vertices[:, 3:], process=False)
+        data = mesh.export(file_type="ply", vertex_normal=True)
         with atomic_write(target) as temporary:
             temporary.write_bytes(data)
         files.append(target)

@@ -27,7 +27,7 @@ from render.mesh.load import load_mesh
 from render.render import render_world
 from render.scene.lights import Environment, PointLight
 from render.scene.scene import SceneObject
-from render.scene.shape import Box, MeshFile, Plane, Sphere, WeldTee
+from render.scene.shape import Box, Cylinder, MeshFile, Plane, Sphere, WeldTee
 from render.world.material_checks import check_materials, departure, scene_warnings
 from render.world.world import build_world
 from tests.render.scenes import paper_camera, paper_laser, scene_of
@@ -143,6 +143,31 @@ def test_shading_that_departs_from_the_facets_is_told_with_its_depth(tmp_path):
     assert quiet == () and fine.depth == pytest.approx(coarse.depth / 1024, rel=0.1)
     assert fine.angle == pytest.approx(coarse.angle / 32, rel=0.1)
     assert off(16, crease_angle=0.0) == (None, ())
+
+
+def across(**changes):
+    """Its z axis in the image."""
+    return ball(**{"T_world_object": Pose(translation=(0.0, 0.0, 0.9), rotation=(math.pi / 2, 0.0, 0.0))} | changes)
+
+
+def test_the_depth_of_shading_is_that_of_a_cylinder_however_long_its_facets_are(tmp_path):
+    """A facet's length along the axis was taken for one along the bend: 0.6 mm was told of a part that is 1 um off."""
+    scene = scene_with(across(shape=Cylinder(radius=0.02, length=0.1, segments=96), crease_angle=0.5))
+    off = departure(build_world(scene, tmp_path), scene, 0)
+    assert off.depth == pytest.approx(0.02 * (1.0 - math.cos(math.pi / 96)), rel=0.02)
+    assert off.angle == pytest.approx(math.pi / 96, rel=1e-3)
+
+
+def test_a_flat_face_that_is_shaded_as_bent_at_its_rim_is_told(tmp_path):
+    """One corner of a square of 0.1 m turned by 2 degrees: an edge that begins so bulges by an eighth of its slope."""
+    mesh = trimesh.Trimesh([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]], [[0, 1, 2], [0, 2, 3]], process=False)
+    slope = math.tan(math.radians(2.0))
+    mesh.vertex_normals = [[0, -slope, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1]]
+    mesh.export(tmp_path / "plate.ply", vertex_normal=True)
+    turned = Pose(translation=(0.0, 0.0, 0.9), rotation=(math.pi, 0.0, 0.0))
+    scene = scene_with(ball(shape=MeshFile(path="plate.ply"), crease_angle=0.5, T_world_object=turned))
+    off = departure(build_world(scene, tmp_path), scene, 0)
+    assert off is not None and off.depth == pytest.approx(0.1 * slope / 8.0, rel=0.01)
 
 
 def test_a_frame_carries_its_warnings(tmp_path):

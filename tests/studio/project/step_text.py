@@ -89,8 +89,15 @@ END-ISO-10303-21;
 """
 
 
-def glb(meshes: dict[str, list[tuple[np.ndarray, tuple[float, ...]]]], nodes: list[dict[str, Any]]) -> bytes:
-    """Meshes by name, each of faces (n, 3, 3) with a colour, that share no vertices; nodes as glTF has them."""
+def glb(
+    meshes: dict[str, list[tuple[np.ndarray, tuple[float, ...]]]],
+    nodes: list[dict[str, Any]],
+    normals: np.ndarray | None = None,
+) -> bytes:
+    """Meshes by name, each of faces (n, 3, 3) with a colour, that share no vertices; nodes as glTF has them.
+
+    normals: of all corners of each, as their faces.
+    """
     tree: dict[str, Any] = {
         "asset": {"version": "2.0"},
         "scene": 0,
@@ -106,10 +113,10 @@ def glb(meshes: dict[str, list[tuple[np.ndarray, tuple[float, ...]]]], nodes: li
         primitives = []
         for corners, colour in faces:
             points = np.asarray(corners, dtype="<f4").reshape(-1, 3)
-            for data, kind, component in (
-                (points, "VEC3", 5126),
-                (np.arange(len(points), dtype="<u4"), "SCALAR", 5125),
-            ):
+            written = [(points, "VEC3", 5126), (np.arange(len(points), dtype="<u4"), "SCALAR", 5125)]
+            if normals is not None:
+                written.insert(0, (np.asarray(normals, dtype="<f4").reshape(-1, 3), "VEC3", 5126))
+            for data, kind, component in written:
                 tree["bufferViews"].append({"buffer": 0, "byteOffset": len(body), "byteLength": data.nbytes})
                 accessor = {"bufferView": len(tree["bufferViews"]) - 1, "componentType": component, "type": kind}
                 tree["accessors"].append({**accessor, "count": len(data)})
@@ -117,6 +124,8 @@ def glb(meshes: dict[str, list[tuple[np.ndarray, tuple[float, ...]]]], nodes: li
             tree["materials"].append({"pbrMetallicRoughness": {"baseColorFactor": [*colour, 1.0]}})
             count = len(tree["accessors"])
             attributes = {"POSITION": count - 2}
+            if normals is not None:
+                attributes["NORMAL"] = count - 3
             primitives.append({"attributes": attributes, "indices": count - 1, "material": len(tree["materials"]) - 1})
         tree["meshes"].append({"name": name, "primitives": primitives})
     tree["buffers"] = [{"byteLength": len(body)}]

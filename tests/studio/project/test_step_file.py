@@ -10,6 +10,9 @@ import pytest
 import trimesh
 
 from render.base.errors import InputError
+from render.mesh.load import load_mesh
+from render.scene.scene import SceneObject
+from render.scene.shape import MeshFile
 from studio.editing.scene_edits import OBJECTS, add_parts
 from studio.project.document import value_at
 from studio.project.mesh_import import import_step
@@ -104,6 +107,38 @@ def test_a_pin_has_its_size_in_the_units_of_its_file_and_facets_within_the_chord
         assert volume(part) == pytest.approx(np.pi * radius**2 * height, rel=2.0 * chord / radius)
         red, green, blue = part.colour or (0.0, 0.0, 0.0)
         assert red > 0.5 and max(green, blue) < 0.1
+
+
+@needs_cascadio
+def test_a_pin_is_shaded_by_its_true_surface(tmp_path: Path) -> None:
+    """The mean of the facets about a corner bends a flat face beside small fillets."""
+    file, project = tmp_path / "pin.step", tmp_path / "project"
+    file.write_text(pin(10.0, 40.0, "mm"))
+    (made,) = import_step(file, project, 1e-5)
+    item = SceneObject(name="pin", shape=MeshFile(path=made.path, unit="mm"), crease_angle=0.5)
+    mesh = load_mesh(item, project)
+    assert mesh.normals is not None and mesh.smooth_normals
+    corners = mesh.vertices[mesh.triangles]
+    flat = np.ptp(corners[:, :, 2], axis=1) == 0.0
+    up = np.where(corners[flat][:, :, 2] > 0.02, 1.0, -1.0)
+    np.testing.assert_allclose(mesh.normals[flat], np.stack([0.0 * up, 0.0 * up, up], axis=-1), atol=1e-6)
+    radial = corners[~flat] * (100.0, 100.0, 0.0)
+    np.testing.assert_allclose(mesh.normals[~flat], radial, atol=1e-5)
+
+
+@pytest.mark.parametrize("undefined", [(0.0, 0.0, 0.0), (np.nan, np.nan, np.nan), "inwards"])
+def test_an_undefined_normal_is_that_of_its_facet(undefined: tuple[float, ...] | str) -> None:
+    """OpenCASCADE writes any at the tip of a cone."""
+    facet = np.cross(BOX[:, 1] - BOX[:, 0], BOX[:, 2] - BOX[:, 0])
+    facet /= np.linalg.norm(facet, axis=1, keepdims=True)
+    leaning = facet + 0.2 * np.roll(facet, 1, axis=1)
+    given = np.stack([facet, leaning, -facet if undefined == "inwards" else np.broadcast_to(undefined, (12, 3))], 1)
+    mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
+    nodes = [{"name": "box", "mesh": 0}, {"name": "copy", "mesh": 0, "matrix": mirror.T.ravel().tolist()}]
+    box, copy = parts_of(glb({"box": [(BOX, RED)]}, nodes, given), "boxes")
+    expected = np.stack([facet, leaning / np.linalg.norm(leaning, axis=1, keepdims=True), facet], axis=1)
+    np.testing.assert_allclose(box.normals, expected, atol=1e-6)
+    np.testing.assert_allclose(copy.normals, expected[:, ::-1] * (-1.0, 1.0, 1.0), atol=1e-6)
 
 
 @pytest.mark.parametrize("lacks", ["a face", "a part", "everything"])
