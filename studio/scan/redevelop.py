@@ -7,11 +7,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from analysis.line.settings import Method
 from render.base.errors import Cancelled
 from render.base.threads import Cancel
 from render.camera.camera import Lens
 from render.frame import Frame
+from render.scene.motion import NoMotion
 from render.scene.scene import Scene
 from render.scene.shape import MeshFile
 from render.sensor.develop import Image, develop
@@ -43,8 +46,11 @@ class Development:
         return self.project.model_copy(update={"scene": scene.model_copy(update={"rig": rig})})
 
 
-def is_stale(rendered: Project, now: Project) -> bool:
-    """Another render would show something that developing again cannot. Both projects at full scale."""
+def is_stale(rendered: Project, now: Project, *, still: bool = False) -> bool:
+    """Another render would show something that developing again cannot. Both projects at full scale.
+
+    still: it is of the first step alone, which a motion that begins there leaves as it was.
+    """
     if rendered.extraction.axis != now.extraction.axis:
         return True
     before, scene = rendered.scene, now.scene
@@ -52,9 +58,17 @@ def is_stale(rendered: Project, now: Project) -> bool:
         return False
     if len(before.lasers) != len(scene.lasers):
         return True
+    if still:
+        before, scene = _at_rest(before), _at_rest(scene)
     # a laser that was off left no light to scale
     lit = any(a.power == 0.0 < b.power for a, b in zip(before.lasers, scene.lasers, strict=True))
     return lit or light_path(_signed_alike(before, scene)) != light_path(_signed_alike(scene, before))
+
+
+def _at_rest(scene: Scene) -> Scene:
+    """Without its motion, where that begins with the poses as they are."""
+    begins = np.array_equal(scene.motion.displacement(0), np.eye(4))
+    return scene.model_copy(update={"motion": NoMotion()}) if begins else scene
 
 
 def _signed_alike(scene: Scene, other: Scene) -> Scene:

@@ -18,7 +18,8 @@ from render.frame import Frame
 from render.world.world import World
 from studio.project.project import Project
 from studio.qt.core.jobs import JobRunner
-from studio.qt.core.session import Render, Session, one_of
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session, one_of
 from studio.runtime.jobs import Job, Progress
 from studio.scan.scan_folder import ScanFolder
 from studio.scan.scan_results import read_results

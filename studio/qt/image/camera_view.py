@@ -24,7 +24,8 @@ from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.laser_box import laser_of
 from studio.qt.core.live_preview import live
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.qt.core.widgets import flush, upper_and_lower
 from studio.qt.image.image_item import PictureView
 from studio.qt.image.line_overlay import BOX_PX, LineOverlay, swatch
@@ -76,8 +77,7 @@ class CameraView(QWidget):
         self.badge_text = QLabel(wordWrap=True)
         self.lines = QWidget()
         self.render_button = QPushButton("Render")
-        self.is_live = True
-        self._gave_way = False
+        self.is_live, self._gave_way = True, False
         """The render was shown until the scene changed; it comes back where that is undone."""
         self._ground = ""
         self._chosen = 0

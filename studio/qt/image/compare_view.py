@@ -15,7 +15,7 @@ from studio.editing.units import Unit
 from studio.qt.core import theme
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.jobs import JobRunner
-from studio.qt.core.session import Render
+from studio.qt.core.render import Render
 from studio.qt.image.image_item import PictureItem, PictureView
 from studio.runtime.jobs import Progress
 from studio.scan.compare import Comparison, Quantity, compare, quantities

@@ -9,7 +9,8 @@ from studio.preview.readouts import readouts
 from studio.preview.remedies import FILLED, automatic_exposure
 from studio.project.project import Project
 from studio.qt.core.live_preview import live
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.qt.render.history import title
 from studio.scan.exposure import filling_exposure
 from studio.scan.redevelop import development

@@ -33,7 +33,8 @@ from studio.project.document import FieldPath
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.jobs import JobRunner
-from studio.qt.core.session import Render, Session, one_of
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import text_button
 from studio.qt.forms.log_field import LogField
 from studio.qt.image.line_overlay import swatch, ticked_swatch

@@ -28,7 +28,8 @@ from studio.qt.core import theme
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.dialogs import ask_removal, show_trouble
 from studio.qt.core.menu_tips import show_tips
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.qt.image.compare_view import CompareView
 from studio.qt.render.kept_list import MARK, Entry, KeptList, kept_lines, kept_tip, place_holder
 from studio.qt.render.python_copy import copy_as_python

@@ -9,7 +9,8 @@ from PySide6.QtGui import QIcon
 
 from studio.project.date_and_time import read_out
 from studio.qt.core.icons import SHAPES, drawn
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.scan.kept_renders import FIGURES, Kept, kept_renders, rename
 from studio.scan.remarks import scale_name
 

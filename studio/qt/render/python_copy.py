@@ -8,7 +8,8 @@ from PySide6.QtWidgets import QApplication
 
 from studio.project.input_files import input_files
 from studio.project.templates import FOLDER
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 
 
 def copy_shown(session: Session) -> None:

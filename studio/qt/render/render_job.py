@@ -15,7 +15,8 @@ from render.frame import Frame
 from render.run import Run
 from render.world.world import World, build_world
 from studio.project.project import Project
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.runtime.jobs import Progress
 from studio.scan.kernel_warm_up import all_compiled, begin, needed, warm_up
 from studio.scan.render_goal import goal_of

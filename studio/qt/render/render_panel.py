@@ -25,7 +25,8 @@ from studio.editing.forms import choice_label
 from studio.project.project import Project
 from studio.qt.core.boxes import ChoiceBox, DecimalBox, WholeBox
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.qt.core.widgets import ShareBar, bring_into_view, text_button
 from studio.qt.render.history import History
 from studio.qt.render.render_job import FirstFigures, can_go_on, render_frames

@@ -25,7 +25,8 @@ from render.world.world import build_world
 from studio.project.date_and_time import read_out
 from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.figures_age import FiguresAge
-from studio.qt.core.session import Render, Session, one_of
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import room_for_a_window, text_button
 from studio.runtime.error_messages import trouble
 from studio.scan.gauging import readings

@@ -6,7 +6,7 @@ from html import escape
 
 from analysis.report.light_text import foretold_lines, plan_lines, quality_lines
 from render.plan import Plan
-from studio.qt.core.session import Render
+from studio.qt.core.render import Render
 
 LONGEST_HEAD = 20
 """Letters before a colon that stand out."""

@@ -17,8 +17,9 @@ from render.base.threads import Cancel
 from studio.qt.core.actions import Actions
 from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.jobs import RENDER, JobRunner
+from studio.qt.core.render import Render
 from studio.qt.core.scan_steps import scan_steps
-from studio.qt.core.session import Render, Session
+from studio.qt.core.session import Session
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job, Progress, State
 from studio.runtime.preferences import PreferencesFile

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from studio.qt.core.figures_age import FiguresAge
+from studio.qt.core.render import Render
 from studio.qt.core.scan_steps import scan_steps
-from studio.qt.core.session import Render, Session, one_of
+from studio.qt.core.session import Session, one_of
 from studio.scan.redevelop import is_developed_otherwise
 from studio.scan.remarks import scale_head
 

@@ -8,8 +8,9 @@ from render.base.errors import InputError
 from render.base.threads import Cancel
 from studio.qt.core.actions import Actions
 from studio.qt.core.jobs import JobRunner
+from studio.qt.core.render import Render
 from studio.qt.core.scan_steps import scan_steps
-from studio.qt.core.session import Render, Session
+from studio.qt.core.session import Session
 from studio.runtime.jobs import Progress
 from studio.scan.redevelop import development
 from studio.scan.scan_folder import open_folder

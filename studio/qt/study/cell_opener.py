@@ -14,7 +14,8 @@ from render.base.errors import InputError
 from render.base.threads import Cancel
 from studio.editing.scene_edits import LASERS
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.runtime.jobs import Job, Progress
 
 if TYPE_CHECKING:

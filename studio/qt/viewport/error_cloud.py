@@ -24,7 +24,6 @@ from studio.qt.viewport.view3d import View3D
 from studio.qt.viewport.viewport_scene import LINE_PX, Lines
 from studio.scan.colour_scale import PER_METRE, ColourScale
 from studio.scan.point_sample import PointSample
-from studio.scan.redevelop import is_stale
 from studio.scan.region import Box
 from studio.scan.remarks import best
 from studio.scan.result_series import ERROR_VIEWS, ErrorView
@@ -311,7 +310,7 @@ class ErrorCloud(QObject):
 
     def _stale(self) -> bool:
         render = self.session.shown
-        return render is not None and is_stale(render.source or render.project, self.session.project)
+        return render is not None and not render.shows(self.session.project)
 
     def _hover(self, x: float, y: float) -> None:
         """The scan line of the point under the mouse, if there is one."""

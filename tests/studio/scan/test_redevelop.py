@@ -7,8 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from render.base.pose import Pose
 from render.frame import Frame
 from render.render import render_world
+from render.scene.motion import LinearStage, PoseList
 from render.scene.scene import SceneObject
 from render.scene.shape import MeshFile
 from render.world.world import World, build_world
@@ -65,6 +67,16 @@ def test_what_developing_decides_leaves_a_render_valid(project, path, value):
 )
 def test_what_light_meets_makes_it_stale(project, path, value):
     assert is_stale(project, replaced(project, path, value))
+
+
+def test_a_motion_leaves_a_still_of_its_beginning_as_it_was(project):
+    """A scan was set up after the first picture, which was then called one of another scene."""
+    moving = replaced(project, ("scene", "motion"), LinearStage(step=(0.0, 0.001, 0.0)))
+    assert is_stale(project, moving) and not is_stale(project, moving, still=True)
+    assert not is_stale(moving, project, still=True)
+    displaced = replaced(project, ("scene", "motion"), PoseList(poses=(Pose(translation=(0.0, 0.01, 0.0)),)))
+    assert is_stale(project, displaced, still=True)
+    assert is_stale(project, replaced(moving, ("scene", "objects", 0, "scale"), 1.1), still=True)
 
 
 def test_an_aperture_that_was_rendered_stays_in_its_frame(project):

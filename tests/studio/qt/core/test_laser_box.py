@@ -16,7 +16,8 @@ from studio.editing.scene_edits import LASERS, remove
 from studio.project.document import Document, replaced
 from studio.qt.core.laser_box import LaserBox, laser_of
 from studio.qt.core.live_preview import live
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.qt.image.camera_view import CameraView
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.results.results_panel import ResultsPanel

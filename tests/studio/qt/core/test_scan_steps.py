@@ -16,7 +16,7 @@ from render.base.errors import Cancelled, InputError
 from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.jobs import RENDER
-from studio.qt.core.session import Render
+from studio.qt.core.render import Render
 from studio.qt.render import motion_panel
 from studio.qt.render.history import describe
 from studio.qt.render.motion_panel import MotionPanel

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication
 
 from analysis.line.result import Flag
 from studio.qt.core.live_preview import live
-from studio.qt.core.session import Render
+from studio.qt.core.render import Render
 from studio.qt.image.camera_view import CameraView
 from studio.qt.image.row_profile import REASONS, fitted_profile
 from tests.studio.qt.small_session import measured_view, small_project, small_render, small_session

@@ -14,7 +14,8 @@ from pytestqt.qtbot import QtBot
 from render.output import frame_files
 from studio.project.document import Document
 from studio.project.project import Project
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.qt.render import history as history_module
 from studio.qt.render import render_table
 from studio.qt.render.history import History

@@ -13,7 +13,8 @@ from render.run import Run
 from render.scene.shape import MeshFile
 from render.world.world import build_world
 from studio.project.document import Document
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.qt.render import history
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.render.python_copy import copy_as_python, copy_shown

@@ -13,7 +13,8 @@ from analysis.gauges.gauge import Gauge
 from analysis.gauges.read import Reading
 from render.base.errors import InputError
 from studio.project.document import Document
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.qt.render.history import History, describe, in_short, title
 from studio.qt.render.render_table import FEWEST_PX, RenderTable, as_kept, keep_render, open_render
 from studio.scan.kept_renders import Kept, kept_renders

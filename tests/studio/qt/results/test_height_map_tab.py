@@ -18,8 +18,9 @@ from analysis.report.units import count
 from render.scene.motion import LinearStage
 from studio.project.document import Document, replaced
 from studio.qt.core.jobs import JobRunner
+from studio.qt.core.render import Render
 from studio.qt.core.scan_steps import scan_steps
-from studio.qt.core.session import Render, Session
+from studio.qt.core.session import Session
 from studio.qt.results.height_map_tab import NOTHING, HeightMapTab, line_sentence
 from studio.scan.height_map import file_range, read_points, steep_record, steep_sentence
 from studio.scan.options import ScanOptions

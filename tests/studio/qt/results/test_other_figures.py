@@ -15,7 +15,8 @@ from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
-from studio.qt.core.session import Render, Session
+from studio.qt.core.render import Render
+from studio.qt.core.session import Session
 from studio.qt.image.camera_view import CameraView
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.render.history import History

@@ -16,7 +16,7 @@ from analysis.gauges.gauge import Gauge
 from analysis.report.units import percent
 from render.world.world import build_world
 from studio.project.project import Project
-from studio.qt.core.session import Render
+from studio.qt.core.render import Render
 from studio.qt.results.measures_table import shown
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell.window import MainWindow

@@ -26,7 +26,8 @@ from pytestqt.qtbot import QtBot
 from studio.project.document import Document, FieldPath
 from studio.qt.calibrate.calibration_work import CalibrationWork
 from studio.qt.core import theme
-from studio.qt.core.session import Render, one_of
+from studio.qt.core.render import Render
+from studio.qt.core.session import one_of
 from studio.qt.core.widgets import ElidedLabel
 from studio.qt.render.history import in_short
 from studio.qt.shell.shortcuts import CheatSheet

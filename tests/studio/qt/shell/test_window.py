@@ -25,7 +25,7 @@ from studio.project.autosave import Autosave
 from studio.qt.core import theme
 from studio.qt.core.actions import COMMANDS, VIEW_KEYS, Command
 from studio.qt.core.live_preview import live
-from studio.qt.core.session import Render
+from studio.qt.core.render import Render
 from studio.qt.shell.fault_notice import FaultNotice, offer
 from studio.qt.shell.help import FOLDER, PAGES
 from studio.qt.shell.panels import PANELS

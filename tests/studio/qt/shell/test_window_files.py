@@ -20,7 +20,7 @@ from studio.project.document import Document
 from studio.project.project import Project
 from studio.project.project_files import missing_files
 from studio.qt.core.jobs import RENDER
-from studio.qt.core.session import Render
+from studio.qt.core.render import Render
 from studio.qt.shell.window import MainWindow
 from tests.studio.qt.shell.window_hands import (
     answer,

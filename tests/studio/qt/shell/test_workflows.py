@@ -15,7 +15,7 @@ from pytestqt.qtbot import QtBot
 
 from studio.preview.gizmo_geometry import arm_end
 from studio.project.project import Project
-from studio.qt.core.session import Render
+from studio.qt.core.render import Render
 from studio.qt.shell.window import MainWindow
 
 RIG, LASER, OBJECT = ("scene", "rig"), ("scene", "rig", "lasers", 0), ("scene", "objects", 0)
