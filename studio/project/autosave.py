@@ -36,11 +36,13 @@ class Recovery:
     """The file it was opened from; None: it was never saved."""
     root: Path
     when: str
+    on_disk: str | None
+    """Digest of that file as the work knew it, so that nobody is asked about what nobody else has written."""
 
     def document(self) -> Document:
         """The work as a document with unsaved changes."""
         document = Document(self.project, None, self.root)
-        document.path = self.path
+        document.path, document.on_disk = self.path, self.on_disk
         return document
 
     @property
@@ -86,6 +88,7 @@ class Autosave:
             "format_version": FORMAT_VERSION,
             "path": None if document.path is None else str(document.path.absolute()),
             "root": str(document.root.absolute()),
+            "on_disk": document.on_disk,
             "when": now(),
             "project": document.project.model_dump(mode="json"),
         }
@@ -165,11 +168,13 @@ def _read(file: Path) -> Recovery:
     data: dict[str, Any] = read_object(file, "recovery file")
     if data.get("format") != FORMAT or data.get("format_version") != FORMAT_VERSION:
         raise InputError("not a recovery file of this version", where=str(file))
-    path, root, project = data.get("path"), data.get("root"), data.get("project")
+    path, root, project, on_disk = data.get("path"), data.get("root"), data.get("project"), data.get("on_disk")
     if not isinstance(root, str) or not isinstance(project, dict) or not isinstance(path, str | None):
         raise InputError("a damaged recovery file", where=str(file))
     loaded = Project.from_data(project, str(file))
-    return Recovery(file, loaded, None if path is None else Path(path), Path(root), str(data.get("when", "")))
+    opened_from = None if path is None else Path(path)
+    known = on_disk if isinstance(on_disk, str) else None
+    return Recovery(file, loaded, opened_from, Path(root), str(data.get("when", "")), known)
 
 
 def _same(path: Path, file: Path) -> bool:

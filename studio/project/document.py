@@ -41,7 +41,8 @@ class Document:
         self.path = path
         self.root = root if root is not None else path.parent if path is not None else Path.cwd()
         self._saved: Project | None = project if path is not None else None
-        self._on_disk = _digest(path)
+        self.on_disk = _digest(path)
+        """Of the file's bytes when it was read or written here; None: it was not."""
         self._undo: list[Edit] = []
         self._redo: list[Edit] = []
         self.listeners: list[Callable[[], None]] = []
@@ -60,7 +61,7 @@ class Document:
     def changed_on_disk(self) -> bool:
         """Somebody else has written the file since it was read or written here: saving would lose what they did."""
         now = _digest(self.path)
-        return now is not None and now != self._on_disk
+        return now is not None and now != self.on_disk
 
     @property
     def undo_label(self) -> str | None:
@@ -119,7 +120,7 @@ class Document:
             old = self.project.name
             self._undo, self._redo = (_renamed(edits, old, name) for edits in (self._undo, self._redo))
         self.path, self.root, self.project, self._saved = target, target.parent, project, project
-        self._on_disk = _digest(target)
+        self.on_disk = _digest(target)
         self._tell()
 
     def _tell(self) -> None:

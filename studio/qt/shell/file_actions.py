@@ -77,6 +77,14 @@ def _scanned(found: ScanFolder) -> Document:
     return Document(project.model_copy(update={"name": name[:MAX_NAME]}), None, found.root)
 
 
+def _as_saved(document: Document, read: Callable[[], Document]) -> Document:
+    """A document, read again where the file has been saved since, as closing what was open may do."""
+    try:
+        return read() if document.changed_on_disk else document
+    except (InputError, OSError, MemoryError):
+        return document
+
+
 def _at_full_scale(found: ScanFolder) -> Project | None:
     """What was scanned, with the scanner's own camera and exposure; None: rounding has hidden them."""
     whole = scaled(found.project, 1.0 / image_scale_of(found))
@@ -153,6 +161,7 @@ class FileActions(QObject):
             return False
         if not wanted or (ask and not self.may_close()):
             return False
+        document = _as_saved(document, lambda: Document(Project.load(file), file))
         if not self._offer(find_of(self.autosave.folder, file)):
             self.replace(document)
         self.preferences.add_recent(file)
@@ -176,6 +185,7 @@ class FileActions(QObject):
         if document is not session.document:
             if ask and not self.may_close():
                 return False
+            document = _as_saved(document, lambda: _scanned(found))
             left = [] if document.path is None else find_of(self.autosave.folder, document.path)
             if not self._offer(left):
                 self.replace(document)

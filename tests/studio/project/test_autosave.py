@@ -144,8 +144,21 @@ def test_recovered_work_knows_the_file_it_came_from(document: Document, tmp_path
     end_without_closing(program)
     recovered = find(tmp_path / "kept")[0].document()
     assert recovered.path == tmp_path / "mine.json" and recovered.dirty
+    assert not recovered.changed_on_disk, "nobody else has written it"
     recovered.save()
     assert Project.load(tmp_path / "mine.json").seed == 77
+
+
+def test_recovered_work_knows_that_its_file_was_written_since(document: Document, tmp_path: Path) -> None:
+    document.save(tmp_path / "mine.json")
+    document.set(("seed",), 77)
+    program = Autosave(tmp_path / "kept")
+    program.keep(document)
+    end_without_closing(program)
+    other = Document(Project.load(tmp_path / "mine.json"), tmp_path / "mine.json")
+    other.set(("seed",), 8)
+    other.save()
+    assert find(tmp_path / "kept")[0].document().changed_on_disk
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need a right there")

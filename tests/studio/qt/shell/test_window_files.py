@@ -113,6 +113,29 @@ class TestFiles:
         assert window.files.save() and Project.load(small_project).name == "mine"
         assert window.files.save(), "nothing is asked of what was written here"
 
+    def test_opening_the_project_that_is_saved_on_the_way_reads_it_as_saved(
+        self, window: MainWindow, qtbot: QtBot, small_project: Path
+    ) -> None:
+        """It had been read before the question, so that what was saved was gone from the window, and then from disk."""
+        window.files.open(small_project)
+        window.session.set(POWER, 0.011)
+        answer(qtbot, "unsaved", "Save")
+        assert window.files.open(small_project)
+        assert window.session.project.scene.lasers[0].power == 0.011
+        assert window.files.save(), "nothing is asked, as nobody else has written it"
+
+    def test_a_scan_is_not_called_after_a_project_that_is_saved_as_another_on_the_way(
+        self, window: MainWindow, qtbot: QtBot, tmp_path: Path
+    ) -> None:
+        file, folder = small_scan(tmp_path)
+        window.files.open(file)
+        window.session.set(POWER, 0.011)
+        answer(qtbot, "unsaved", "Save")
+        assert window.files.open_results(folder)
+        assert Project.load(file).scene.lasers[0].power == 0.011
+        assert window.session.project.scene.lasers[0].power != 0.011
+        assert window.session.document.path is None, "saving the scan's project asks for a place"
+
     def test_an_untouched_project_closes_without_a_question(self, own_window: MainWindow) -> None:
         assert own_window.close()
 
