@@ -1,4 +1,6 @@
-"""Jobs for the desktop: one at a time in each lane, the newest request next, all signals on the window's thread."""
+"""Jobs for the desktop: one at a time in each lane, the newest request next or all in order, all signals on the
+window's thread.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,7 @@ class JobRunner(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._running: dict[str, Job[Any]] = {}
-        self._next: dict[str, Job[Any]] = {}
+        self._next: dict[str, list[Job[Any]]] = {}
         self._then: dict[Job[Any], Callable[[Any], None]] = {}
         self._closed = False
         self._timer = QTimer(self, interval=PROGRESS_MS)
@@ -60,19 +62,20 @@ class JobRunner(QObject):
         then: Callable[[Any], None] | None = None,
         *,
         interrupt: bool = False,
+        in_turn: bool = False,
     ) -> Job[Any]:
         """Start work in a lane, or have it wait for the job there; a newer request takes a waiting one's place.
 
-        then: called with the result, on this thread. interrupt: the job that runs in the lane is cancelled.
+        then: called with the result, on this thread. interrupt: the job that runs in the lane is cancelled. in_turn:
+        it waits behind those that wait.
         """
         job: Job[Any] = Job(name, work, self._tell_end)
         if then is not None:
             self._then[job] = then
         if lane in self._running:
-            waiting = self._next.pop(lane, None)
-            if waiting is not None:
-                self._then.pop(waiting, None)
-            self._next[lane] = job
+            if not in_turn:
+                self._forget_waiting(lane)
+            self._next.setdefault(lane, []).append(job)
             if interrupt:
                 self._running[lane].cancel()
         else:
@@ -83,6 +86,11 @@ class JobRunner(QObject):
         """The one that runs in a lane."""
         return self._running.get(lane)
 
+    def jobs(self, lane: str) -> list[Job[Any]]:
+        """The one that runs in a lane, and those that wait there."""
+        running = self.job(lane)
+        return [] if running is None else [running, *self._next.get(lane, [])]
+
     @property
     def busy(self) -> bool:
         """Something runs or waits."""
@@ -90,9 +98,7 @@ class JobRunner(QObject):
 
     def cancel(self, lane: str = RENDER) -> None:
         """Stop what runs in a lane, and forget what waits there."""
-        waiting = self._next.pop(lane, None)
-        if waiting is not None:
-            self._then.pop(waiting, None)
+        self._forget_waiting(lane)
         if lane in self._running:
             self._running[lane].cancel()
 
@@ -107,6 +113,10 @@ class JobRunner(QObject):
         for job in self._running.values():
             job.join()
         self._running.clear()
+
+    def _forget_waiting(self, lane: str) -> None:
+        for job in self._next.pop(lane, ()):
+            self._then.pop(job, None)
 
     def _start(self, lane: str, job: Job[Any]) -> None:
         if self._closed:
@@ -127,9 +137,9 @@ class JobRunner(QObject):
             return
         job.join()
         del self._running[lane]
-        waiting = self._next.pop(lane, None)
+        waiting = self._next.pop(lane, [])
         then = self._then.pop(job, None)
-        if not self._running and waiting is None:
+        if not self._running and not waiting:
             self._timer.stop()
         if job.state is State.DONE:
             if then is not None:
@@ -139,11 +149,14 @@ class JobRunner(QObject):
             self.failed.emit(job)
         else:
             self.cancelled.emit(job)
-        if waiting is not None and not self._closed:
-            if lane in self._running:  # what was told has started another
-                self._next.setdefault(lane, waiting)
-            else:
-                self._start(lane, waiting)
+        if not waiting or self._closed:
+            return
+        if lane in self._running:  # what was told has started another
+            self._next.setdefault(lane, waiting)
+            return
+        self._start(lane, waiting[0])
+        if waiting[1:]:
+            self._next[lane] = [*waiting[1:], *self._next.get(lane, [])]
 
     def _tell(self) -> None:
         began = time.perf_counter()

@@ -21,7 +21,7 @@ from studio.qt.core.render import Render
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.runtime.error_messages import trouble
-from studio.runtime.jobs import Job, Progress, State
+from studio.runtime.jobs import Job, Progress
 from studio.runtime.preferences import PreferencesFile
 from studio.scan.film import export_film
 from studio.scan.height_map import export_height_map, left_out_of
@@ -71,7 +71,8 @@ class ExportActions(QObject):
         actions.connect("screenshot", self.screenshot)
         for signal in (session.renders_changed, session.measured, session.developed):
             signal.connect(self.refresh)
-        self._job: Job[list[Path]] | None = None
+        self._jobs: list[Job[list[Path]]] = []
+        """That run, or wait for others."""
         self.whole: Callable[[], ScanResults | None] = lambda: None
         """The scan of whose steps together the figures on the screen are."""
         runner.cancelled.connect(self._tell_cancelled)
@@ -163,16 +164,15 @@ class ExportActions(QObject):
             self._tell(written, said + (f", of {of}" if of else ""), (*notes, *left_out))
 
         self._tell_wait(path)
-        self._job = self.runner.run(LANE, f"export {path.name}", work, then)
+        job = self.runner.run(LANE, f"export {path.name}", work, then, in_turn=True)
+        self._jobs = [job, *(before for before in self._jobs if before in self.runner.jobs(LANE))]
         self.preferences.change(folder=str(path.parent))
 
     def _tell_wait(self, path: Path) -> None:
         """At once, where it will take a while: the status bar shows the render, and not what is written beside it."""
-        running, rendering, before = self.runner.job(LANE), self.runner.job(RENDER), self._job
+        running, rendering = self.runner.job(LANE), self.runner.job(RENDER)
         if running is not None:
-            dropped = before is not None and before is not running and before.state is State.QUEUED
-            instead = f", in place of: {before.name}" if before is not None and dropped else ""
-            told = f"{path.name} is written after: {running.name}{instead}"
+            told = f"{path.name} is written after: {', '.join(job.name for job in self.runner.jobs(LANE))}"
         elif rendering is not None:
             told = f"{path.name} is being written beside the {rendering.name}, which takes longer"
         else:
@@ -204,7 +204,7 @@ class ExportActions(QObject):
             show_trouble(self.window, trouble(error, "save the screenshot"))
 
     def _tell_cancelled(self, job: Job[list[Path]]) -> None:
-        if job is self._job:
+        if job in self._jobs:
             self.session.message.emit("info", f"Cancelled: {job.name}. No file was written")
 
     def _tell(self, written: list[Path], of: str, notes: tuple[str, ...]) -> None:

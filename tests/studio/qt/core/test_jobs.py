@@ -53,6 +53,42 @@ def test_the_newest_waiting_request_wins(qtbot, runner):
     assert results == ["first", 19]
 
 
+def test_requests_in_turn_are_all_done_in_order(qtbot, runner):
+    first, results = threading.Event(), []
+    runner.run("a", "first", wait_for(first), lambda result: results.append("first"))
+    for i in range(5):
+        runner.run("a", f"{i}", lambda progress, cancelled, i=i: i, results.append, in_turn=True)
+    assert [job.name for job in runner.jobs("a")] == ["first", "0", "1", "2", "3", "4"]
+    first.set()
+    qtbot.waitUntil(lambda: not runner.busy)
+    assert results == ["first", 0, 1, 2, 3, 4]
+
+
+def test_what_waits_in_turn_goes_on_where_an_end_starts_another(qtbot, runner):
+    first, results = threading.Event(), []
+
+    def again(result):
+        results.append("first")
+        runner.run("a", "more", lambda progress, cancelled: "more", results.append, in_turn=True)
+
+    runner.run("a", "first", wait_for(first), again)
+    for i in range(3):
+        runner.run("a", f"{i}", lambda progress, cancelled, i=i: i, results.append, in_turn=True)
+    first.set()
+    qtbot.waitUntil(lambda: not runner.busy)
+    assert sorted(map(str, results)) == ["0", "1", "2", "first", "more"]
+
+
+def test_cancelling_a_lane_forgets_all_that_waits(qtbot, runner):
+    results = []
+    runner.run("a", "first", lambda progress, cancelled: wait_for(threading.Event())(progress, cancelled))
+    for i in range(3):
+        runner.run("a", f"{i}", lambda progress, cancelled, i=i: i, results.append, in_turn=True)
+    runner.cancel("a")
+    qtbot.waitUntil(lambda: not runner.busy)
+    assert results == [] and runner.jobs("a") == []
+
+
 def test_lanes_do_not_wait_for_each_other(qtbot, runner):
     held, results = threading.Event(), []
     runner.run("render", "long", wait_for(held))

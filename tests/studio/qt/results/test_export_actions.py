@@ -116,14 +116,15 @@ def test_an_export_that_takes_longer_beside_other_work_is_told_at_once(
     for name in ("b.csv", "c.csv"):
         actions.write("export_csv", tmp_path / name)
     assert told[0].startswith("b.csv is written after: export a.csv. A message")
-    assert told[1].startswith("c.csv is written after: export a.csv, in place of: export b.csv")
+    assert told[1].startswith("c.csv is written after: export a.csv, export b.csv. A message")
     go_on.set()
     qtbot.waitUntil(lambda: not runner.busy)
-    assert (tmp_path / "c.csv").exists() and "Wrote" in told[2]
+    assert (tmp_path / "b.csv").exists() and (tmp_path / "c.csv").exists(), "none takes another's place"
+    assert "b.csv" in told[2] and "c.csv" in told[3]
     go_on.clear()
     runner.run(RENDER, "scan", lambda progress, cancelled: go_on.wait())
     actions.write("export_csv", tmp_path / "d.csv")
-    assert told[3].startswith("d.csv is being written beside the scan")
+    assert told[4].startswith("d.csv is being written beside the scan")
     go_on.set()
     qtbot.waitUntil(lambda: not runner.busy)
     runner.close()
