@@ -22,7 +22,7 @@ class Plane:
     """Where a section is taken."""
 
     point: tuple[float, float, float]
-    """m, world frame; the origin of its axes."""
+    """m, world frame; any of the plane."""
     normal: tuple[float, float, float]
     """Of any length but zero."""
 
@@ -42,13 +42,19 @@ class Plane:
         across /= np.linalg.norm(across)
         return np.stack([across, np.cross(normal, across), normal])
 
+    @property
+    def origin(self) -> Float:
+        """(3,) m: the place nearest to the world's, so that heights in an upright section are those of the world."""
+        normal = self.axes[2]
+        return np.asarray((normal @ np.asarray(self.point)) * normal)
+
     def local(self, points: Float) -> Float:
         """(n, 3) m -> across, up, and how far off the plane."""
-        return np.asarray((points - np.asarray(self.point)) @ self.axes.T)
+        return np.asarray((points - self.origin) @ self.axes.T)
 
     def world(self, local: Float) -> Float:
         """(n, 2) or (n, 3) m of its own axes -> (n, 3)."""
-        return np.asarray(np.asarray(self.point) + local @ self.axes[: local.shape[1]])
+        return np.asarray(self.origin + local @ self.axes[: local.shape[1]])
 
     def sheet(self, low: Float, high: Float) -> Float:
         """(4, 3) corners of the least rectangle of it, along its axes, before and behind which the box (3,) (3,) is."""

@@ -244,7 +244,8 @@ class SectionTab(QWidget):
         lines = np.concatenate([gap, *(piece for line in made.true for piece in (1e3 * line, gap))])
         self.truth.setData(*lines.T, connect="finite")
         self.dots.setData(*(1e3 * made.measured[:, :2]).T)
-        self.plot.setLabel("bottom", f"{towards('Across', made.plane.axes[0])} / mm")
+        self.plot.setLabel("bottom", f"{along('Across', made.plane.axes[0])} / mm")
+        self.plot.setLabel("left", f"{along('Up', made.plane.axes[1])} / mm")
         self.plot.enableAutoRange()
         part, points = counted(len(made.true), "line"), counted(len(made.measured), "point")
         self.told.setText(f"{part} of the true part, {points} within the slab")
@@ -303,13 +304,13 @@ class SectionTab(QWidget):
         self.column.setDirection(direction)
 
 
-def towards(name: str, axis: Float) -> str:
-    """A plane's own axis by the world's that it runs along, where it does: a section is seen from one of two sides."""
-    along = int(np.argmax(np.abs(axis)))
-    if abs(axis[along]) < 1.0 - 1e-6:
+def along(name: str, axis: Float) -> str:
+    """A plane's own axis by the world's that it is, where it is one: a section is seen from one of two sides."""
+    which = int(np.argmax(np.abs(axis)))
+    if abs(axis[which]) < 1.0 - 1e-6:
         return name
-    sign = "+" if axis[along] > 0.0 else "-"
-    return f"{name}, towards {sign}{'xyz'[along]}"
+    sign = "" if axis[which] > 0.0 else "−"  # noqa: RUF001 - as numbers have it
+    return f"{name} = {sign}{'xyz'[which]}"
 
 
 def _box(name: str, unit: Unit, low: float, high: float, value: float, decimals: int = 3) -> UnitBox:

@@ -83,7 +83,8 @@ def test_the_arrow_moves_it_along_its_normal_and_the_files_are_of_there(
     np.testing.assert_allclose(of["true"], tab.plane.point[0], atol=1e-9)
     assert len(of["measured"]) > 0 and np.abs(of["measured"] - tab.plane.point[0]).max() <= 0.5e-3 + 1e-9
     # seen so that y runs to the right: beside a profile it looked like another part
-    assert tab.plot.getAxis("bottom").labelText == "Across, towards +y / mm"
+    assert tab.plot.getAxis("bottom").labelText == "Across = y / mm"
+    assert tab.plot.getAxis("left").labelText == "Up = z / mm"
 
 
 def test_a_ring_turns_it_and_escape_puts_it_back(desk: Desk) -> None:
