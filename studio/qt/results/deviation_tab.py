@@ -131,11 +131,12 @@ class DeviationTab(QWidget):
         self._follow_delivery()
         there = are_there(self.session)
         self.compare_button.setEnabled(there)
-        running, self._running = self._running is not None, None
+        compared, self._running = self.compared is not None or self._running is not None, None
+        compared |= self.told.text() == ANOTHER
         self._show(None)
         if not there:
             self.told.setText(NOTHING)
-        elif running:
+        elif compared:
             self.told.setText(ANOTHER)
 
     def _follow_delivery(self) -> None:

@@ -173,6 +173,18 @@ def test_an_input_that_changes_while_it_is_compared_counts(panel: NominalPanel, 
     assert tab.compared is None and "Compare again" in tab.told.text(), "of points that are shown no longer"
 
 
+def test_figures_of_points_that_were_measured_before_say_why_they_are_gone(
+    panel: NominalPanel, session: Session, qtbot: QtBot
+) -> None:
+    tab = panel.deviation
+    assert tab.told.text() == ""
+    tab.compare()
+    qtbot.waitUntil(lambda: tab.compared is not None)
+    for _ in range(2):  # more than one signal comes of a measurement
+        session.measured.emit()
+        assert tab.compared is None and "Compare again" in tab.told.text()
+
+
 def test_a_comparison_that_fails_leaves_no_figures(panel: NominalPanel, qtbot: QtBot) -> None:
     tab = panel.deviation
     tab.compare()
