@@ -102,4 +102,4 @@ class ProfilePlot(plots.PointedPlots):
 
 
 def _height(section: ProfileSection) -> str:
-    return "Distance from the laser" if section == "laser_plane" else "From the laser, in the section"
+    return "Distance from the laser" if section == "laser_plane" else "From the laser"
