@@ -70,6 +70,11 @@ class Errors:
     """Scan lines with peaks where there is no line to be seen, none of whose rays gives a point."""
 
     @property
+    def false_alarms(self) -> int:
+        """Scan lines on which a position was found although there is no line to be seen, with a point or without."""
+        return self.false_rows + self.depthless_rows
+
+    @property
     def completeness(self) -> float:
         """Measured rows over truth rows; NaN when nothing is visible."""
         return self.measured_rows / self.truth_rows if self.truth_rows else float("nan")

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from analysis.gauges.fit import OUTLIER_SIGMAS, Fit, Frame, fit, polynomial
 from analysis.gauges.profile import Profile
+from analysis.gauges.true_end import surface_end
 from analysis.measures import robust_sigma
 from render.base.arrays import Float
 
@@ -47,6 +48,7 @@ POINTS_END = (
     "part, this is no edge"
 )
 NOT_IN_TRUTH = "the exact line has no such edges: the points end there, and not the part"
+"""Where the exact line has none at all; of those that it has, the remark says why their ends are not known."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,7 @@ class Edge(Fit):
     why: str = ""
     """In words, why there is no edge, in which case the end is NaN; empty: there is one."""
     remark: str = ""
+    """In words, that it may be none, or why the true end is not known, in which case the end is NaN."""
 
     @property
     def place(self) -> Float:
@@ -208,7 +211,23 @@ def _ending(profile: Profile, part: Float, name: str, order: Places, jump: NDArr
     theta = np.append(line.theta, along[last] - share * inwards)
     uneven = _unevenness(profile, surface[last:])
     sigmas = np.append(line.sigma, sigma)
-    return Edge(theta, sigmas, gradient, line.here, line.frame, line.ratio, abs(inwards), uneven)
+    found = Edge(theta, sigmas, gradient, line.here, line.frame, line.ratio, abs(inwards), uneven)
+    if profile.true_section is None:
+        return found
+    return _truly(found, profile, surface[last:], math.copysign(1.0, -inwards), reach, name)
+
+
+def _truly(edge: Edge, profile: Profile, surface: Places, outwards: float, reach: float, name: str) -> Edge:
+    """With the end of the part's own surface; outwards: 1.0 or -1.0, along the edge's frame."""
+    assert profile.true_section is not None
+    constant, slope = edge.theta[:2]
+    last = edge.frame.local(profile.position[surface[0]])[0]
+    foot = edge.frame.out(np.array([last, constant + slope * last]))
+    along = outwards * np.array([1.0, slope]) @ edge.frame.axes / math.hypot(1.0, slope)
+    end = surface_end(profile.true_section, profile.position[surface], foot, along, reach, edge.pitch)
+    theta = edge.theta.copy()
+    theta[2] = math.nan if isinstance(end, str) else edge.frame.local(end)[0]
+    return replace(edge, theta=theta, remark=end.format(name) if isinstance(end, str) else "")
 
 
 def _strong(profile: Profile, surface: Places) -> NDArray[np.bool_]:
@@ -272,7 +291,7 @@ def _where_points_end(profile: Profile, part: Float, region: tuple[float, float]
         return _nothing(profile, (TWO_EDGES if room.any() else NO_JUMP).format(name))
     edge = 0 if room[0] else len(order) - 1
     found = _ending(profile, part, name, *_from_the_edge(order, jump, edge, bool(room[0])), order[:0])
-    return replace(found, remark=POINTS_END.format(name))
+    return replace(found, remark=found.remark or POINTS_END.format(name))
 
 
 def _nothing(profile: Profile, why: str) -> Edge:

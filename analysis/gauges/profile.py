@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.error import Errors
+from analysis.gauges.true_end import TrueSection
 from analysis.triangulate import Points
 from render.base.arrays import Float
 from render.base.pose import transform_points
@@ -56,6 +57,8 @@ class Profile:
     section: Section = Section()
     strength: Float | None = None
     """(m,) electrons at the line's peak; None: a point is of its scan line's middle alone, as on the exact line."""
+    true_section: TrueSection | None = None
+    """Of the part, by which edges of the exact line are known; None: these are points, which do not tell of it."""
     fitted: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     """The curves that were fitted to it so far, for whoever reads and then draws them; by kind and regions."""
 
@@ -79,6 +82,7 @@ class Profile:
             None if self.normal is None else self.normal[here],
             self.section,
             None if self.strength is None else self.strength[here],
+            self.true_section,
         )
 
     def whitening(self) -> tuple[Float, Float]:
@@ -147,8 +151,13 @@ def measured_profile(
     )
 
 
-def true_profile(curve: LaserCurve, T_section_camera: Float, measured: Profile) -> Profile:
-    """The exact line, where it is lit; its points weigh as the measured ones beside them."""
+def true_profile(
+    curve: LaserCurve, T_section_camera: Float, measured: Profile, part: TrueSection | None = None
+) -> Profile:
+    """The exact line, where it is lit; its points weigh as the measured ones beside them.
+
+    part: in the same section; without it no edge has a true end.
+    """
     position = _in_section(T_section_camera, curve.point[curve.irradiance > 0.0])
     order = np.argsort(measured.position[:, 0], kind="stable")
     weight = np.tile([0.0, ANY_SIGMA], (len(position), 1))
@@ -156,7 +165,8 @@ def true_profile(curve: LaserCurve, T_section_camera: Float, measured: Profile) 
         across = measured.position[order, 0]
         weight = np.stack([np.interp(position[:, 0], across, measured.random[order, k]) for k in (0, 1)], axis=1)
     index = np.asarray(curve.index[curve.irradiance > 0.0], dtype=np.intp)
-    return Profile(position, weight, np.zeros((len(position), 2, 0)), index, np.ones(len(position)))
+    none = np.zeros((len(position), 2, 0))
+    return Profile(position, weight, none, index, np.ones(len(position)), true_section=part or TrueSection())
 
 
 def _in_section(T_section_camera: Float, camera: Float) -> Float:

@@ -72,7 +72,7 @@ class Reading:
     points: int = 0
     """Used."""
     truth: float = NAN
-    """Of the exact line, by the same definition."""
+    """Of the exact line, by the same definition; from edge to edge, of the part's own surface."""
     reason: str = ""
     """Why there is no value."""
     remark: str = ""
@@ -126,7 +126,7 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
         remark = STRAY
     elif edges:
         seen = "; ".join(one.remark for one in edges if one.remark)
-        remark = NOT_IN_TRUTH if truth is not None and math.isnan(true) else seen
+        remark = _without_ends(gauge, truth) if truth is not None and math.isnan(true) else seen
     if not remark and ratio > MISFIT:
         remark = MISFITS.get(gauge.kind, OTHER_SHAPE).format(ratio)
     remark = remark or _swapped(gauge) or _left_out(gauge, measured, fits)
@@ -216,6 +216,14 @@ def _true_value(gauge: Gauge, truth: Profile | None) -> float:
     # the exact line is seen no farther than the measured one: over what is hidden it tells no area either
     hidden = gauge.kind == "area" and unseen(truth, gauge.regions[1], fits[0].frame).length > 0.0
     return NAN if hidden else value
+
+
+def _without_ends(gauge: Gauge, truth: Profile) -> str:
+    """In words, why the exact line has no such edges, or where they are is not known."""
+    parts = parts_of(gauge, truth)
+    fits = [] if isinstance(parts, str) else curves_of(gauge, truth, parts)[0]
+    unknown = [one.remark for one in fits if isinstance(one, Edge) and one.remark and not one.why]
+    return "; ".join(unknown) if unknown else NOT_IN_TRUTH
 
 
 def parts_of(gauge: Gauge, profile: Profile) -> list[Float] | str:

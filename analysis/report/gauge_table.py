@@ -28,8 +28,8 @@ DEFINITIONS: dict[Kind, str] = {
     "flatness": "Flatness here is the form of second degree (bow and twist) that is fitted to the surface, from peak "
     "to valley over its least-squares plane; waves, dents and roughness do not count, as they do by ISO 1101.",
     "edge_to_edge": "Edge to edge: each edge lies midway between the last scan line on the surface that ends there and "
-    "the next, and unsure by half their distance either way, as its sigma says; the truth is of the same scan lines, "
-    "so that the error may be 0 all the same. Scan lines that are closer tell it better.",
+    "the next, and unsure by half their distance either way, as its sigma says; the truth is where the part's own "
+    "surface ends, whatever scan lines meet it. Scan lines that are closer tell it better.",
 }
 """Of kinds whose name a drawing means otherwise, or whose error does not tell all, in a few words each."""
 OPPOSITE = 0.02

@@ -32,9 +32,11 @@ def headline(report: ReportInput) -> str:
     where = f"in {frames} frames" if frames > 1 else "in one frame"
     who = "one laser" if lasers == 1 else f"{lasers} lasers"
     if found.truth_rows == 0:
+        false = f" {_found_without_a_line(found.false_alarms)}." if found.false_alarms else ""
         return (
             f"Nothing was measured: {who} drew no line that the camera could see {where}. "
             "Either the laser is off, or its sheet misses the part, or the part hides the line from the camera."
+            f"{false}"
         )
     if found.measured_rows == 0:
         stray = f" The {count(found.points)} points are stray light or noise." if found.points else ""
@@ -76,12 +78,16 @@ def scale_note(image_scale: float) -> str:
     return f"{scale_head(image_scale)} {each} size (image scale 1) gives those."
 
 
-def little_found(completeness: float | None, points: int, name: str = "") -> str:
-    """That less than half of the line was found; empty where it was. None: there was no line. name: of the laser."""
+def little_found(completeness: float | None, points: int, false: int = 0, name: str = "") -> str:
+    """That less than half of the line was found; empty where it was.
+
+    completeness: None: there was no line; false: scan lines with a position and no line; name: of the laser.
+    """
     who = f"{name}: " if name else ""
     stray = f"; the {points} points are stray light or noise" if points else ""
     if completeness is None or np.isnan(completeness):
-        return f"{who}No line is lit and seen, so that nothing was measured{stray}."
+        told = f". {_found_without_a_line(false)}" if false else stray
+        return f"{who}No line is lit and seen, so that nothing was measured{told}."
     if completeness == 0.0:
         return f"{who}Nothing of the line was found{stray}."
     if completeness >= LITTLE:
@@ -97,7 +103,7 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
 
     found: of one laser or all, of a frame or a whole scan; image_scale: at which it was measured.
     """
-    missing = little_found(found.completeness, found.points)
+    missing = little_found(found.completeness, found.points, found.false_alarms)
     said = [text for text in (missing, scale_note(image_scale)) if text]
     if found.truth_rows == 0 or found.depth_z.count < ENOUGH:
         return said
@@ -110,10 +116,10 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
     if found.false_rows:
         said.append(_of_false_rows(found.false_rows, found.false_rows_at_ends))
     if found.depthless_rows:
-        has = "has" if found.depthless_rows == 1 else "have"
+        carry = "carries" if found.depthless_rows == 1 else "carry"
         said.append(
-            f"{counted(found.depthless_rows, 'scan line')} without a line {has} a peak whose ray gives no depth: it is "
-            "of stray light or noise, and neither a point nor a false scan line."
+            f"{counted(found.depthless_rows, 'false scan line')} {carry} a peak whose ray gives no depth, and so no "
+            "point: it is of stray light or noise."
         )
     # what most points err by, all alike and each on its own
     usual = np.hypot(found.depth_z.median, found.depth_z.robust_sigma)
@@ -179,6 +185,10 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
             f"{percent(found.saturated)} of the peaks are saturated and were measured from what is left of them."
         )
     return said
+
+
+def _found_without_a_line(false: int) -> str:
+    return f"What was found on {counted(false, 'false scan line')} is stray light or noise"
 
 
 def _of_false_rows(false: int, at_ends: int) -> str:

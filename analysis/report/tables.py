@@ -73,6 +73,7 @@ def measure_tables(report: ReportInput) -> list[MethodTable]:
                 ("with a point", count(found.valid_rows)),
                 ("rightly measured", f"{count(found.measured_rows)} ({percent(found.completeness)})"),
                 ("with a point but no line", count(found.false_rows)),
+                *([("with neither, but a peak", count(found.depthless_rows))] if found.depthless_rows else []),
             ]
             tables.append(MethodTable(prefix + method_name(found.method), method_colour(found.method), rows, lines))
     return tables

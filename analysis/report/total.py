@@ -67,6 +67,11 @@ class Total:
     """m, median standard deviation of `depth_z` by the calibration; 0: it is taken as exact."""
 
     @property
+    def false_alarms(self) -> int:
+        """Scan lines on which a position was found although there is no line to be seen, with a point or without."""
+        return self.false_rows + self.depthless_rows
+
+    @property
     def completeness(self) -> float:
         """Measured rows over truth rows; NaN when nothing is visible."""
         return self.measured_rows / self.truth_rows if self.truth_rows else float("nan")

@@ -53,7 +53,8 @@ class Cautions:
         for name in lasers:
             own = next((row for row in rows if row["laser"] == name), None)
             if own is not None:
-                found.append(little_found(own["completeness"], own["points"], name if len(lasers) > 1 else ""))
+                told = own["completeness"], own["points"], own["false_scan_lines"], name if len(lasers) > 1 else ""
+                found.append(little_found(*told))
         found.append(scale_note(self.image_scale))
         for name, unseen in zip(lasers, self._unseen, strict=True):
             if unseen > 0 and self._frames > 1:

@@ -18,8 +18,10 @@ from analysis.gauges.gauge import Gauge
 from analysis.gauges.of_scan import Patch, patch
 from analysis.gauges.profile import Profile, measured_profile, true_profile
 from analysis.gauges.read import Reading, read
+from analysis.gauges.true_end import true_section
 from render.base.errors import InputError
 from render.base.files import atomic_write, read_bytes
+from render.base.pose import invert
 from render.frame import Frame
 from studio.project.found_motion import measured_pose
 from studio.project.project import ProfileSection, Project
@@ -39,7 +41,10 @@ def profiles(project: Project, frame: Frame, found: Measurement, section: Profil
     strength = found.line.amplitude[found.points.index, found.points.rank]
     name = section_of(project.scene, found.laser, frame.step, section)
     measured = measured_profile(found.points, found.errors, T, name, strength)
-    return measured, true_profile(frame.curves[found.laser], T, measured)
+    T_camera_world, curve = invert(project.scene.T_world_camera(frame.step)), frame.curves[found.laser]
+    T_laser_world = invert(project.scene.T_camera_laser(found.laser)) @ T_camera_world
+    part = true_section(curve, T @ T_camera_world, T_laser_world, project.scene.lasers[found.laser].tan_half_fan)
+    return measured, true_profile(curve, T, measured, part)
 
 
 def readings(project: Project, frame: Frame, found: Sequence[Measurement]) -> tuple[Reading, ...]:

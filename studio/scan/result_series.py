@@ -157,7 +157,7 @@ def table(found: list[Measurement], view: ErrorView) -> list[tuple[str, str, lis
     rows += [
         ("Points", "", [float(one.points.valid.sum()) for one in found]),
         ("Completeness", "%", [100.0 * one.errors.completeness for one in found]),
-        ("False scan lines", "", [float(one.errors.false_rows) for one in found]),
+        ("False scan lines", "", [float(one.errors.false_alarms) for one in found]),
     ]
     rows.append((OUTLIERS[view.kind], "%", [100.0 * one.outlier_rate for one in of]))
     rows.append((COVERED, "%", [100.0 * _covered(one, view) for one in found]))

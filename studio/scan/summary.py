@@ -36,7 +36,7 @@ def _figures(found: Total) -> dict[str, Any]:
     return {
         "points": found.points,
         "completeness": found.completeness if found.truth_rows else None,
-        "false_scan_lines": found.false_rows,
+        "false_scan_lines": found.false_alarms,
         "outliers": found.outliers,
         "scan_lines": found.lines,
         "sampled_scan_lines": found.lines_kept,

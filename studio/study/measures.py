@@ -139,7 +139,7 @@ def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> d
         "position_p95": errors.u.p95,
         "completeness": errors.completeness,
         "wrong_rows": wrong / visible,
-        "false_rows": errors.false_rows / rows,
+        "false_rows": errors.false_alarms / rows,
         "autocorrelation": errors.depth_z.autocorrelation,
         "no_peak_rows": float(np.mean(first == Flag.NO_PEAK)),
         "saturated_rows": float(np.mean(first == Flag.SATURATED)),

@@ -21,7 +21,8 @@ EXPLAINED = {
     "Points": "Points measured.",
     "Completeness": "Share of the scan lines on which the line can be seen that have a point of it, and no outlier in "
     "the image.",
-    "False scan lines": "Scan lines with a point although no line is to be seen there.",
+    "False scan lines": "Scan lines on which a position was found although no line is to be seen there, "
+    "also where its ray gives no point.",
     "Bias": "Mean error: what averaging does not remove.",
     UNCERTAINTY: "Twice the standard deviation of the bias, as neighbouring scan lines err alike: a smaller one may be "
     "chance.",
