@@ -153,16 +153,16 @@ def blur_px(camera: Camera, points: Float) -> Float:
     w is that of `render.camera.lens`.
     """
     plane = camera.focus_plane
-    return np.asarray(_blur_scale(camera) * np.abs(points @ plane[:3] + plane[3]) / points[:, 2])
+    return np.asarray(dioptre_px(camera) * np.abs(points @ plane[:3] + plane[3]) / points[:, 2])
 
 
 def depth_of_field(camera: Camera, sharp_px: float = SHARP_PX) -> tuple[float, float]:
     """Nearest and farthest depth on the axis at which the blur disc is at most `sharp_px` across; inf: no end."""
-    reach, focus = sharp_px / _blur_scale(camera), camera.focus_vergence
+    reach, focus = sharp_px / dioptre_px(camera), camera.focus_vergence
     return 1.0 / (focus + reach), 1.0 / (focus - reach) if focus > reach else math.inf
 
 
-def _blur_scale(camera: Camera) -> float:
+def dioptre_px(camera: Camera) -> float:
     """Blur in px for one dioptre: aperture times image distance over pitch."""
     return 2.0 * camera.aperture_radius * camera.fx
 

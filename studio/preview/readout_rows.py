@@ -21,6 +21,9 @@ MUCH_SATURATED = 0.2
 MOST_SATURATED = 0.5
 """Share from which a median along the line is of one that saturates."""
 
+ANGLE = math.radians(10), math.radians(60)
+"""rad of triangulation: below the first depth is coarse, above the second much is occluded."""
+
 MEASURED = 3.0
 """Times the detection's threshold from which a line on ambient light is measured nearly as often as it is detected: of
 v_groove at 0.3 mW, at twice the threshold, a fit refused six in seven of the scan lines."""
@@ -65,7 +68,7 @@ def rows(r: Readouts) -> tuple[Row, ...]:
             lambda value: f"{math.degrees(value):.1f}",
             "Between the rays of camera and laser, at the surface. Below 10° depth is coarse; "
             "above 60° much is occluded.",
-            _outside(math.radians(5), math.radians(10), math.radians(60), math.radians(75)),
+            _outside(math.radians(5), *ANGLE, math.radians(75)),
         ),
         _ranged(
             "standoff",

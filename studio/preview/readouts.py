@@ -81,6 +81,8 @@ class Readouts:
     """Times its mean that speckle makes a pixel's laser light on RARE of the scan lines; 1 without speckle."""
     laser_electrons: float | None = None
     """What of the brightest pixel is the laser's light, median."""
+    most_laser_electrons: float | None = None
+    """The same on the scan line that has most of it."""
     ambient_electrons: float | None = None
     """Background of ambient light and dark current, unshadowed, median."""
     detected: float | None = None
@@ -165,6 +167,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         saturated=float(np.mean(saturated_lines(sensor, camera, source.wavelength_nm, *lines))),
         brightest=brightest(sensor, camera, source.wavelength_nm, RARE),
         laser_electrons=_median(light),
+        most_laser_electrons=None if (lit_by := _range(light)) is None else lit_by.high,
         ambient_electrons=float(np.median(ambient)),
         detected=_median(response / look.project.extraction.threshold),
         blur_px=_range(estimates.blur_px(camera, curve.point)),

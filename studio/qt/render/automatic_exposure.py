@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from studio.editing.units import Unit
 from studio.preview.readouts import readouts
-from studio.preview.remedies import FILLED, automatic_exposure
+from studio.preview.remedy_changes import FILLED, automatic_exposure
 from studio.project.project import Project
 from studio.qt.core.live_preview import live
 from studio.qt.core.render import Render

@@ -28,7 +28,7 @@ from render.base.threads import Cancel
 from render.frame import Frame
 from render.sensor.develop import Image
 from studio.preview.inspection import view_warnings
-from studio.preview.remedies import FILLED
+from studio.preview.remedy_changes import FILLED
 from studio.project.document import FieldPath
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.figures_age import FiguresAge

@@ -17,7 +17,7 @@ from studio.editing.placing import at_angle, at_baseline, turned_to
 from studio.editing.units import Unit
 from studio.preview.preview import Look
 from studio.preview.readouts import Readouts, readouts
-from studio.preview.remedies import lit_point
+from studio.preview.remedy_changes import lit_point
 from studio.project.document import FieldPath, replaced
 from studio.project.project import Project
 from studio.qt.core import theme

@@ -10,9 +10,12 @@ from typing import Any
 import pytest
 
 from render.laser.laser import Waist
+from studio.editing.presets import CAMERA, preset_named, with_preset
 from studio.preview.preview import Preview
+from studio.preview.readout_rows import rows
 from studio.preview.readouts import Readouts, readouts
-from studio.preview.remedies import FILLED, Remedy, remedies
+from studio.preview.remedies import Remedy, remedies
+from studio.preview.remedy_changes import FILLED
 from studio.project.document import replaced, value_at
 from studio.project.project import Project
 from studio.project.templates import template_folder
@@ -20,6 +23,7 @@ from studio.project.templates import template_folder
 ROOT = Path(__file__).parents[3] / "assets/projects/plane"
 LASER = ("scene", "rig", "lasers", 0)
 LENS = ("scene", "rig", "camera", "lens")
+AMBIENT = ("scene", "environment", "radiance")
 PREVIEW = Preview(1)
 
 
@@ -102,6 +106,8 @@ NAMES = {
     "scene.rig.lasers.0.power": "power ",
     "scene.rig.lasers.0.sheet.full_angle": "the sheet's divergence ",
     "scene.rig.lasers.0.sheet.focus_distance": "the laser's focus ",
+    "scene.rig.lasers.0.sheet.radius": "the laser's waist ",
+    "sensor.band_pass": "a band-pass filter ",
     "scene.rig.lasers.0.T_rig_laser": ("move the laser", "aim the laser"),
 }
 """What each field that a proposal may change is called in its text."""
@@ -119,6 +125,9 @@ WRONG: tuple[tuple[str, dict[tuple[Any, ...], Any]], ...] = (
     ("plane", {(*LASER, "T_rig_laser"): {"translation": (0.2, 0.0, 0.0), "rotation": (0.0, 0.9, 0.0)}}),
     ("plane", {(*LENS, "focus_distance"): 0.2}),
     ("plane", {(*LENS, "focus_distance"): None}),
+    ("plane", {(*LASER, "sheet"): Waist(radius=1e-2, focus_distance=0.8)}),
+    ("plane", {AMBIENT: (100.0, 100.0, 100.0)}),
+    ("glass_ball", {(*LASER, "T_rig_laser"): {"translation": (0.02, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0)}}),
     ("v_groove", {(*LENS, "f_number"): 1.4}),
     ("sphere", {(*LENS, "f_number"): 1.4, (*LENS, "focus_distance"): 0.8161}),
     *((name, {}) for name in sorted(path.name for path in ROOT.parent.iterdir() if (path / "project.json").is_file())),
@@ -153,8 +162,8 @@ def test_every_field_that_a_proposal_changes_is_named_in_its_text(proposed: list
 
 
 def fields(value: Any, path: str = "") -> dict[str, Any]:
-    """Leaves of a project's JSON by their paths; a pose is one."""
-    if path.endswith("T_rig_laser") or not isinstance(value, dict | list):
+    """Leaves of a project's JSON by their paths; a pose is one, and a filter."""
+    if path.endswith(("T_rig_laser", "band_pass")) or not isinstance(value, dict | list):
         return {path: value}
     items = value.items() if isinstance(value, dict) else enumerate(value)
     return {key: leaf for name, one in items for key, leaf in fields(one, f"{path}.{name}".lstrip(".")).items()}
@@ -212,3 +221,65 @@ def test_a_proposal_puts_no_other_read_out_out_of_range() -> None:
     for remedy in found:
         before, after = read(project), read(remedy.project)
         assert after.scan_lines_hit == before.scan_lines_hit
+
+
+LEFT_RED: tuple[tuple[str, str, dict[tuple[Any, ...], Any]], ...] = (
+    ("blur", "weld_seam", {(*LENS, "f_number"): 1.4, (*LENS, "focus_distance"): None}),
+    ("width", "plane", {(*LASER, "sheet"): Waist(radius=1e-5, focus_distance=0.5)}),
+    ("width", "plane", {(*LASER, "sheet"): Waist(radius=1e-2, focus_distance=0.8)}),
+    ("peak", "weld_seam", {(*LASER, "power"): 1e-5}),
+    ("working", "weld_seam", {(*LASER, "T_rig_laser"): {"translation": (0.2, 0.0, 0.0), "rotation": (0.0, 0.9, 0.0)}}),
+    ("saturated", "plane", {AMBIENT: (100.0, 100.0, 100.0)}),
+    ("angle", "glass_ball", {(*LASER, "T_rig_laser"): {"translation": (0.02, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0)}}),
+)
+"""Out of range, and left without a proposal: none brought it into its range with all others where they were."""
+
+
+@pytest.mark.parametrize(("key", "name", "wrong"), LEFT_RED, ids=[f"{key} {name}" for key, name, _ in LEFT_RED])
+def test_what_is_red_is_made_better_click_by_click(key: str, name: str, wrong: dict[tuple[Any, ...], Any]) -> None:
+    root = template_folder(name)
+    project = Project.load(root / "project.json")
+    if name != "glass_ball":
+        project = with_preset(project, CAMERA, preset_named("cameras", "12 megapixels", ""))
+    for path, value in wrong.items():
+        project = replaced(project, path, value)
+    levels, was = [], ""
+    for _ in range(5):
+        look = PREVIEW.look(project, root)
+        row = next(one for one in rows(readouts(look, 0)) if one.key == key)
+        assert not was or row.value == was, "what was told is what is read"
+        levels.append(row.level)
+        found = [one for one in remedies(look, 0, partial(PREVIEW.look, root=root)) if one.key == key]
+        if not found:
+            break
+        project, was = found[0].project, str(found[0].gain.split(", ")[0]).partition(" to ")[2]
+        was = was.removesuffix(" of the scan lines")
+    assert levels[0] == "error"
+    assert levels[-1] != "error", levels
+
+
+def test_a_lens_that_is_far_out_of_focus_is_focused_before_anything_else() -> None:
+    """Focus alone leaves it red, and no smaller aperture is needed to see most of the blur go."""
+    root = template_folder("weld_seam")
+    project = with_preset(Project.load(root / "project.json"), CAMERA, preset_named("cameras", "12 megapixels", ""))
+    project = replaced(project, (*LENS, "f_number"), 2.8)
+    found = remedies(PREVIEW.look(project, root), 0, partial(PREVIEW.look, root=root))
+    remedy = next(one for one in found if one.key == "blur")
+    assert remedy.label == "focus far away → 790.6 mm"
+    assert re.match(r"defocus blur from 89\.1 to 7\.1 px", remedy.gain), "and it is red yet"
+
+
+def test_what_is_put_out_of_range_is_in_the_price() -> None:
+    key, name, wrong = LEFT_RED[-1]
+    root = template_folder(name)
+    project = Project.load(root / "project.json")
+    for path, value in wrong.items():
+        project = replaced(project, path, value)
+    found = remedies(PREVIEW.look(project, root), 0, partial(PREVIEW.look, root=root))
+    remedy = next(one for one in found if one.key == key)
+    before, after = (
+        {row.key: row for row in rows(readouts(PREVIEW.look(one, root), 0))} for one in (project, remedy.project)
+    )
+    spoiled = [row for row in after.values() if row.level and not before[row.key].level]
+    assert [row.level for row in spoiled] == ["warning"], "an error is never traded for another"
+    assert f"{spoiled[0].label.lower()} from {before[spoiled[0].key].value} to {spoiled[0].value}" in remedy.price

@@ -9,7 +9,7 @@ import pytest
 
 from render.frame import Frame, LaserCurve
 from render.sensor.develop import develop
-from studio.preview.remedies import FILLED
+from studio.preview.remedy_changes import FILLED
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.scan.exposure import filling_exposure
