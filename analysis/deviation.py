@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy  # whose parts are loaded as they are named: the window starts without them
@@ -41,7 +41,9 @@ FEWEST = 6
 COVERAGE = 2.0
 """Sigmas of a point's uncertainty."""
 NEIGHBOURS = 5
-"""Points, itself among them, whose median tells whether a point stands alone."""
+"""Points, itself among them, of which most tell whether a point stands alone."""
+APART, MOST_ASKED = 10.0, 20_000
+"""Times how far these usually reach, beyond which each of them stands alone; and of how many points that is asked."""
 SMALL = 0.25
 JUMP, GRAZING = 3.0, 0.1
 """Of `unsure_of_place`."""
@@ -186,9 +188,9 @@ def verdicts(
 
     U = 2 sigma for what is within, as the whole part is if all of it is. One place beyond is enough for it to be out,
     and of thousands of points some are beyond by two of their sigmas by chance: for what is beyond U is as large as
-    lets chance find a single one of all of them as rarely as two sigmas do of one (Bonferroni), and the median of its
-    NEIGHBOURS has to be beyond the limit as well, as no stray point is a place of the part. unsure: (m,) points that
-    prove nothing beyond, as of `unsure_of_place`.
+    lets chance find a single one of all of them as rarely as two sigmas do of one (Bonferroni), and of its NEIGHBOURS
+    most have to be beyond by two sigmas as well, and as near as points of a surface are, as no stray point is a place
+    of the part, nor are a few that stand apart. unsure: (m,) points that prove nothing beyond, as of `unsure_of_place`.
     """
     found = np.full(len(value), UNDECIDED, dtype=np.int8)
     found[(value - COVERAGE * sigma >= lower) & (value + COVERAGE * sigma <= upper)] = WITHIN
@@ -198,11 +200,23 @@ def verdicts(
         below, above = below & ~unsure, above & ~unsure
     some = np.flatnonzero(below | above)
     if len(some):
-        _, around = scipy.spatial.cKDTree(points).query(points[some], k=min(NEIGHBOURS, len(points)))
-        local = np.median(value[around.reshape(len(some), -1)], axis=1)
-        found[some[below[some] & (local < lower)]] = BELOW
-        found[some[above[some] & (local > upper)]] = ABOVE
+        tree = scipy.spatial.cKDTree(points)
+        reach, around = tree.query(points[some], k=min(NEIGHBOURS, len(points)))
+        reach, around = reach.reshape(len(some), -1)[:, -1], around.reshape(len(some), -1)
+        near = reach <= APART * _usual_reach(tree)
+        # NaN, of a sigma that nobody knows, is beyond nothing
+        for out, beyond, side in (
+            (below, value + COVERAGE * sigma < lower, BELOW),
+            (above, value - COVERAGE * sigma > upper, ABOVE),
+        ):
+            found[some[out[some] & near & (np.count_nonzero(beyond[around], axis=1) > around.shape[1] // 2)]] = side
     return found
+
+
+def _usual_reach(tree: Any) -> float:
+    """m, from a point to the farthest of its NEIGHBOURS, as half of all points have it, or of a sample of them."""
+    every = tree.data[:: max(1, len(tree.data) // MOST_ASKED)]
+    return float(np.median(tree.query(every, k=min(NEIGHBOURS, len(tree.data)))[0].reshape(len(every), -1)[:, -1]))
 
 
 def unsure_of_place(

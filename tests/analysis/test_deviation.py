@@ -207,3 +207,21 @@ def test_a_stray_point_puts_no_part_out_and_keeps_it_from_passing() -> None:
     value[210] = 50.0
     found = verdicts(points, value, np.full(400, 0.1), -1.0, 1.0)
     assert found[210] == UNDECIDED and verdict_of(found) == "undecided"
+
+
+def test_stray_points_beside_each_other_put_no_part_out_and_a_dent_of_three_points_does() -> None:
+    """Three of 7,000 points, up to 360 mm over the last step of a scan of a part against itself, were its failure."""
+    points, scan_line = profiles()
+    height = np.random.default_rng(3).uniform(50.0, 400.0, 12)
+    stray = np.column_stack([np.arange(4.0, 16.0), np.full(12, 5.0), height])
+    every = np.concatenate([points, stray])
+    lines = np.append(scan_line, 5004 + np.arange(12))
+    value, sigma = np.append(np.zeros(len(points)), height), np.full(len(every), 1e-2)
+    unsure = unsure_of_place(every, value, lines, sigma, sigma)
+    assert not unsure[len(points) :].all(), "of some even their profile tells no edge"
+    found = verdicts(every, value, sigma, -0.1, 0.1, unsure)
+    assert verdict_of(found) == "undecided" and np.all(found[len(points) :] == UNDECIDED)
+    dent = np.flatnonzero((np.abs(every[:, 0] - 10.0) <= 1.0) & (every[:, 1] == 2.0))
+    every[dent, 2] = value[dent] = -0.3
+    found = verdicts(every, value, sigma, -0.1, 0.1, unsure_of_place(every, value, lines, sigma, sigma))
+    assert verdict_of(found) == "fail" and np.isin(np.flatnonzero(found == BELOW), dent).all()
