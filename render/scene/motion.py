@@ -57,7 +57,7 @@ class Turntable(Model):
 
     kind: Literal["turntable"] = "turntable"
     moves: Moves = quantity("objects", label="What moves")
-    centre: Position = quantity((0.0, 0.0, 0.0), unit="m", label="Axis point", help="Any point of the axis of rotation.")
+    centre: Position = quantity((0.0, 0.0, 0.0), unit="m", label="Axis point", help="Any place on the axis.")
     axis: tuple[Direction, Direction, Direction] = quantity((0.0, 0.0, 1.0), label="Axis direction")
     angle_step: float = quantity(math.radians(1), unit="rad", label="Step", ge=-math.pi, le=math.pi)
     steps: int = quantity(360, label="Frames", gt=0, le=MAX_STEPS)
