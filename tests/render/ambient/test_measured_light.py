@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter
 
-from render.ambient import coarse_image as coarse_module
 from render.ambient.coarse_image import COARSE_ERROR, CoarseImage, coarse_image
 from render.ambient.guided_image import places_of
 from render.ambient.guided_interpolation import SEEN, grid_of, interpolate, smooth_grid
@@ -208,19 +206,6 @@ def test_the_error_told_of_the_coarse_image_is_the_true_one():
     difference = np.array(told) - np.array(true)
     assert abs(difference.mean()) < 4.0 * difference.std(ddof=1) / np.sqrt(len(told))
     assert np.sqrt(np.mean(true)) < 1.1 * COARSE_ERROR
-
-
-def test_the_error_told_is_no_less_than_the_noise_that_is_known(monkeypatch):
-    """Held-out pixels that a bright path missed told 0.0 % of an image that was 11 % off, and ended its samples."""
-    halves = np.array([[[1.0, 1.0, 1.0], [1.2, 1.2, 1.2]]])
-    missed = np.array([[[1.2, 1.2, 1.2], [0.9, 0.9, 0.9]]])
-    monkeypatch.setattr(coarse_module, "_light_grid", lambda *_, **__: None)
-    monkeypatch.setattr(coarse_module, "radiance_at", lambda *_: halves.reshape(-1, 6))
-    monkeypatch.setattr(coarse_module, "own_places", lambda paths: None)
-    film = SimpleNamespace(means=lambda pixels: missed)
-    grid = SimpleNamespace(pixels=np.array([0], np.int32))
-    error, noise = coarse_module._errors(film, None, 1, grid, np.array([1], np.int32), 1)
-    assert noise == pytest.approx(0.1 / np.sqrt(1.2 * 0.9)) and error == noise
 
 
 def test_light_over_a_texture_is_interpolated_as_light():

@@ -142,7 +142,7 @@ def test_scan_lines_are_of_the_step_that_is_looked_at(panel: ResultsPanel, qtbot
     qtbot.waitUntil(lambda: "of step 3 of 3" in panel.region.title.text())
 
 
-@pytest.mark.parametrize("width", [1366, 900])
+@pytest.mark.parametrize("width", [1366, 900, 640])
 def test_what_stands_above_the_figures_is_seen_whole(panel: ResultsPanel, qtbot: QtBot, width: int) -> None:
     """Of one line that was cut off nobody could read what to do."""
     panel.resize(width, 300)
@@ -152,6 +152,7 @@ def test_what_stands_above_the_figures_is_seen_whole(panel: ResultsPanel, qtbot:
     assert label.text().startswith(CHANGED) and MEASURED_OTHERWISE in label.text() and label.isVisible()
     qtbot.waitUntil(lambda: label.height() >= label.heightForWidth(label.width()) > 0)
     assert label.width() >= max(label.fontMetrics().horizontalAdvance(word) for word in label.text().split())
+    assert label.width() > label.height(), "a sliver beside the steps held a word in each line"
     assert panel.rect().contains(label.mapTo(panel, label.rect().bottomRight()))
 
 
