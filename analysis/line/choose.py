@@ -36,9 +36,10 @@ def choose_method(lines: Lines, settings: ExtractionSettings, threads: int | Non
     valid = exact.valid[:, 0]
     if valid.sum() < FEWEST:
         return "likelihood", f"likelihood: a line on {int(valid.sum())} of {sample.count} scan lines looked at"
-    saturated = float(np.mean(exact.flag[valid, 0] == Flag.SATURATED))
-    if saturated > SATURATED_SHARE:
-        return "likelihood", f"likelihood: saturated on {saturated:.0%} of the scan lines, measured from its wings"
+    saturated = int(np.count_nonzero(exact.flag[valid, 0] == Flag.SATURATED))
+    if saturated > SATURATED_SHARE * valid.sum():
+        told = f"saturated on {saturated} of {int(valid.sum())} scan lines looked at, measured from its wings"
+        return "likelihood", f"likelihood: {told}"
     width = float(np.median(exact.width[valid, 0]))
     if width < NARROWEST:
         return "likelihood", f"likelihood: {width:.2f} px narrow, integrated over each pixel"

@@ -181,9 +181,7 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
             "for the pixels, so that the measured position depends on where within a pixel the line falls."
         )
     if found.saturated > 0.02:
-        said.append(
-            f"{percent(found.saturated)} of the peaks are saturated and were measured from what is left of them."
-        )
+        said.append("Saturated peaks were measured from what is left of them.")  # how many is counted in the image
     return said
 
 
@@ -208,7 +206,7 @@ def sample_note(found: Total) -> str:
     if not found.sampled:
         return ""
     return (
-        f"Robust sigma, P95, outliers, lag 1 and the share of narrow or saturated peaks are those of a sample of "
+        f"Robust sigma, P95, outliers, lag 1 and the share of narrow lines are those of a sample of "
         f"{count(found.lines_kept)} of the {count(found.lines)} scan lines, drawn by chance; n, bias, sigma, RMSE, the "
         "share within ±2 sigma and the counts of scan lines are of all."
     )

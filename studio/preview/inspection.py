@@ -146,9 +146,27 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
     )
 
 
-def view_warnings(project: Project, frame: Frame, laser_power: Sequence[float] | None = None) -> list[str]:
-    """What `inspect` warns of, in a frame as it was rendered; laser_power: W of each laser in place of the scene's."""
-    return _warnings(project, laser_views(project, frame, laser_power), laser_power)
+def view_warnings(
+    project: Project,
+    frame: Frame,
+    laser_power: Sequence[float] | None = None,
+    saturated: Sequence[float | None] | None = None,
+) -> list[str]:
+    """What `inspect` warns of, in a frame as it was rendered; laser_power: W of each laser in place of the scene's.
+
+    saturated: share of each laser's scan lines as it was counted in images, in place of what is expected of the light.
+    """
+    views = laser_views(project, frame, laser_power)
+    if saturated is not None:
+        views = tuple(replace(view, saturated=share) for view, share in zip(views, saturated, strict=True))
+    return _warnings(project, views, laser_power)
+
+
+def saturation_warning(name: str, saturated: float | None) -> str:
+    """Of the share of a laser's scan lines; empty: there is nothing to warn of."""
+    if saturated is None or not saturated > 0.01:
+        return ""
+    return f"{name}: on {saturated:.0%} of the scan lines the brightest pixel saturates; shorten the exposure time"
 
 
 def laser_views(
@@ -352,11 +370,8 @@ def _warnings(project: Project, views: tuple[LaserView, ...], laser_power: Seque
                 f"{view.name}: the ambient light alone saturates {view.ambient_saturated:.0%} of the line; shorten "
                 "the exposure time, add a band-pass filter, or darken the lamps"
             )
-        if view.saturated is not None and view.saturated > 0.01:
-            found.append(
-                f"{view.name}: on {view.saturated:.0%} of the scan lines the brightest pixel saturates; shorten the "
-                "exposure time"
-            )
+        if told := saturation_warning(view.name, view.saturated):
+            found.append(told)
         if view.light_electrons is not None and view.light_electrons < DIM_ELECTRONS:
             power = project.scene.lasers[i].power if laser_power is None else laser_power[i]
             found.append(f"{view.name}: {_why_dim(project, i, power, view.light_electrons)}")

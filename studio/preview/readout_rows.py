@@ -32,6 +32,8 @@ OF_ANOTHER_SET_UP = (
     "That is more than it can be by chance: it was made before the camera, its lens or the laser was changed. "
     "Calibrate again, or take it out of the project: Calibrate, Remove it from the project."
 )
+PEAK = "Median peak signal"
+"""Beside the share of the full well, which is of the brightest place."""
 NOT_REFLECTED = "Light that is reflected between surfaces, which a render shows, is not counted."
 
 
@@ -181,11 +183,12 @@ def _working_depth(r: Readouts) -> str:
 
 def _peak(r: Readouts) -> Row:
     help = (
-        "Electrons of the brightest pixel of a scan line, with the ambient light that no shadow takes away. "
+        "Electrons of the brightest pixel of a scan line, with the ambient light that no shadow takes away: the median "
+        "along the line. "
         f"{NOT_REFLECTED}"
     )
     if r.peak_electrons is None or r.laser_electrons is None or r.ambient_electrons is None or r.detected is None:
-        return Row("peak", "Peak signal", NOTHING, "", "", help)
+        return Row("peak", PEAK, NOTHING, "", "", help)
     middle, low, high = r.peak_electrons.middle, r.peak_electrons.low, r.peak_electrons.high
     help += f" Along the line {low:,.0f} to {high:,.0f} e-. Full well: {r.full_well:,.0f} e-."
     help += (
@@ -197,13 +200,14 @@ def _peak(r: Readouts) -> Row:
     faint = r.detected < MEASURED or r.laser_electrons < DIM_ELECTRONS
     level: Level = "error" if r.detected < 1.0 else "warning" if faint else ""
     note = f"laser {r.laser_electrons:,.0f} over {r.ambient_electrons:,.0f}"
-    return Row("peak", "Peak signal", f"{middle:,.0f} e-", note, level, help)
+    return Row("peak", PEAK, f"{middle:,.0f} e-", note, level, help)
 
 
 def _saturation(r: Readouts) -> Row:
     help = (
         "Expected share of the scan lines whose brightest pixel exceeds the full well: shot and read noise decide it, "
-        "and speckle where the sensor's is switched on. Shorten the exposure, or lower the power. "
+        "and speckle where the sensor's is switched on. Beside it stands how full the brightest place of the line is, "
+        "as it is expected without noise. Shorten the exposure, or lower the power. "
         f"{NOT_REFLECTED}"
     )
     if r.saturated is None or r.peak_electrons is None:
@@ -211,7 +215,7 @@ def _saturation(r: Readouts) -> Row:
     level: Level = "error" if r.saturated > MUCH_SATURATED else "warning" if r.saturated > SATURATED else ""
     full = r.peak_electrons.high / r.full_well
     alone = " without speckle" if r.speckled else ""
-    return Row("saturated", "Saturated", f"{r.saturated:.0%}", f"{full:.0%} of full well{alone}", level, help)
+    return Row("saturated", "Saturated", f"{r.saturated:.0%}", f"up to {full:.0%} of full well{alone}", level, help)
 
 
 def _focus(r: Readouts) -> Row:

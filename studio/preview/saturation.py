@@ -1,14 +1,20 @@
 """How many scan lines saturate: the chance that shot noise, read noise and speckle lift a pixel over its full well.
 
-One estimate for all who tell of it, be the mean light of the pixels a closed form or rendered.
+One estimate for all who tell of it, be the mean light of the pixels a closed form or rendered. Where an image has been
+developed, they are counted in it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from render.base.arrays import Float
 from render.camera.camera import Camera
+from render.frame import LaserCurve
+from render.sensor.develop import Image
 from render.sensor.sensor import Sensor
 from studio.preview.scintillation import line_light, relative_covariance, widths_known
 
@@ -82,6 +88,22 @@ def saturated_lines(
         *_, light = line_light(sigma[known], position[known], amplitude[known])
         found[known] = saturated_rows(sensor, camera, wavelength_nm, light, background[known][:, None])
     return found
+
+
+def counted_saturated(images: Sequence[Image], curves: Sequence[LaserCurve]) -> NDArray[np.int64]:
+    """(n, 2) of the scan lines that a laser's line is seen on: those whose brightest pixel saturates, and all."""
+    found = np.zeros((len(curves), 2), dtype=np.int64)
+    for own, image, curve in zip(found, images, curves, strict=False):
+        brightest = image.pixels.max(axis=1 if curve.axis == "rows" else 0)
+        hit = np.unique(curve.index)
+        full = brightest[hit].reshape(len(hit), -1) >= image.saturation  # of a photograph any of its channels
+        own[:] = np.count_nonzero(full.any(axis=1)), len(hit)
+    return found
+
+
+def shares(counted: NDArray[np.int64]) -> list[float | None]:
+    """Of such counts; None: there are no scan lines."""
+    return [full / seen if seen else None for full, seen in counted.tolist()]
 
 
 def brightest(sensor: Sensor, camera: Camera, wavelength_nm: float, chance: float) -> float:

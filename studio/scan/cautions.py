@@ -7,9 +7,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+
 from analysis.report.summary import little_found, scale_note
 from render.frame import Frame
-from studio.preview.inspection import view_warnings
+from render.sensor.develop import Image
+from studio.preview.inspection import saturation_warning, view_warnings
+from studio.preview.saturation import counted_saturated, shares
 from studio.project.project import Project
 
 NAMED = 3
@@ -24,6 +28,8 @@ class Cautions:
         self.project, self.image_scale, self.laser_power = project, image_scale, laser_power
         self._frames = 0
         self._unseen = [0] * len(project.scene.lasers)
+        self._saturated = np.zeros((len(project.scene.lasers), 2), dtype=np.int64)
+        """Of each laser, as of `counted_saturated`, in all images."""
         self._doubts: dict[str, str] = {}
         self._caught: list[warnings.WarningMessage] = []
         self._heard: dict[str, None] = {}
@@ -36,10 +42,13 @@ class Cautions:
             yield
         self._hear()
 
-    def look(self, frame: Frame, scene_warnings: Iterable[str]) -> None:
-        """At one frame, as rendered, with what `render.world.material_checks.scene_warnings` has to say of it."""
+    def look(self, frame: Frame, scene_warnings: Iterable[str], images: Sequence[Image]) -> None:
+        """At one frame, as rendered and developed, with what `render.world.material_checks.scene_warnings` says."""
         self._hear()
-        views = view_warnings(self.project, frame, self.laser_power) if self._frames == 0 else []
+        # what saturates is counted over all frames
+        told = [None] * len(frame.curves)
+        views = view_warnings(self.project, frame, self.laser_power, told) if self._frames == 0 else []
+        self._saturated += counted_saturated(images, frame.curves)
         for text in (*views, *scene_warnings):  # in words as at first, though figures change from step to step
             self._doubts.setdefault(text.split(",", 1)[0], text)
         for i, curve in enumerate(frame.curves):
@@ -59,6 +68,7 @@ class Cautions:
         for name, unseen in zip(lasers, self._unseen, strict=True):
             if unseen > 0 and self._frames > 1:
                 found.append(f"{name}: in {unseen} of {self._frames} frames no part of the line is both lit and seen")
+        found += map(saturation_warning, lasers, shares(self._saturated))
         self._hear()
         return list(dict.fromkeys(filter(None, (*found, *self._doubts.values(), *self._heard))))
 

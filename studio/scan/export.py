@@ -71,7 +71,7 @@ def export_report(path: Path, what: Exported) -> list[Path]:
         what.image_scale,
         [laser.power for laser in what.project.scene.lasers],
     )
-    cautions.look(what.frame, what.frame.warnings)
+    cautions.look(what.frame, what.frame.warnings, what.images)
     result = frame_result(what.project, what.frame, what.measurements, what.images)
     with closing(record_of(what.project.scene, [result])) as record:
         lacks = image_lacks(what.project, best(what.measurements, what.project))

@@ -82,8 +82,9 @@ def _measured(
                 )
             world = moved_world(project, frame.step, first)
             aimed |= is_aimed(frame)
-            cautions.look(frame, (*frame.warnings, *scene_warnings(world, project.scene, frame.step)))
-            measuring.add(frame, world, develop_step(project, frame, clock, threads, how.laser_power))
+            images = develop_step(project, frame, clock, threads, how.laser_power)
+            cautions.look(frame, (*frame.warnings, *scene_warnings(world, project.scene, frame.step)), images)
+            measuring.add(frame, world, images)
         measuring.finish()
         if not measuring.record.steps or not project.scene.lasers:
             raise InputError("the scan holds no laser image", where=str(found.folder))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -13,6 +14,7 @@ from render.base.errors import InputError
 from render.frame import Frame
 from render.output.light_record import plan_record, quality_from, quality_record
 from render.scan_plan import ScanPlan, plan_scan
+from render.sensor.develop import Image
 from render.world.world import World, build_world
 from studio.project.date_and_time import now
 from studio.project.input_files import input_hashes
@@ -57,13 +59,13 @@ class Written:
     """Of the frames' sidecars."""
     light: list[dict[str, Any]] = field(default_factory=list)
 
-    def add(self, frame: Frame) -> None:
+    def add(self, frame: Frame, images: Sequence[Image]) -> None:
         """Plan and quality of a frame, and what is doubtful about it."""
         record = light_record(frame)
         if self.light and self.light[-1]["plan"] == record["plan"]:
             record["plan"] = self.light[-1]["plan"]  # once in memory
         self.light.append(record)
-        self.cautions.look(frame, frame.warnings)
+        self.cautions.look(frame, frame.warnings, images)
 
 
 def run_scan(
@@ -197,8 +199,8 @@ def _take_frames(scan: Scan, first: World, count: int, written: Written, measuri
     with FrameWriter(scan) as writer, closing(rendered_frames(scan, first, count)) as frames:
         for _ in scan.clock.frames(count):
             found = next(frames)
-            written.add(found.frame)
             images = develop_step(scan.project, found.frame, scan.clock, scan.options.threads)
+            written.add(found.frame, images)
             writer.add(found.frame, found.state, images)
             if measuring is not None:
                 measuring.add(found.frame, found.world, images)

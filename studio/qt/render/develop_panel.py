@@ -29,6 +29,7 @@ from render.frame import Frame
 from render.sensor.develop import Image
 from studio.preview.inspection import view_warnings
 from studio.preview.remedy_changes import FILLED
+from studio.preview.saturation import counted_saturated, shares
 from studio.project.document import FieldPath
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.figures_age import FiguresAge
@@ -345,7 +346,8 @@ class DevelopPanel(QWidget):
             missing = tuple(method for method in methods if method not in known)
             found = {**known, **measure_again(frame, world, how, images, missing, cancelled=cancelled)}
             measured: dict[str, list[Measurement]] = {method: found[method] for method in methods if method in found}
-            return measured, view_warnings(how.project, frame, how.laser_power)
+            saturated = shares(counted_saturated(images, frame.curves))
+            return measured, view_warnings(how.project, frame, how.laser_power, saturated)
 
         def then(done: tuple[dict[str, list[Measurement]], list[str]]) -> None:
             found, render.doubts = done

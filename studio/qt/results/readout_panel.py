@@ -47,6 +47,8 @@ class ReadoutPanel(QWidget):
         self._hint.setObjectName("muted")
         self._narrow = False
         """Ranges stand below their values."""
+        self._long: set[str] = set()
+        """Rows whose ranges have no room below their values alone, and begin below their names."""
         self._labels: dict[str, tuple[ElidedLabel, QLabel | PlacingField, ElidedLabel]] = {}
         inner = QFrame()
         column = QVBoxLayout(inner)
@@ -93,11 +95,14 @@ class ReadoutPanel(QWidget):
         fix = max((button.sizeHint().width() for button in self._fix.values()), default=0)
         # also while no button is seen, as one that comes would else move the fields from under the mouse
         wanted = sum(map(max, zip(*widths, strict=True)), LEFT + RIGHT + 3 * SPACING + fix) if widths else 0
-        narrow = self.width() - self._area.verticalScrollBar().sizeHint().width() < wanted
-        if narrow != self._narrow:
-            self._narrow = narrow
+        inside = self.width() - self._area.verticalScrollBar().sizeHint().width()
+        room = inside - LEFT - RIGHT - SPACING - max((name for name, *_ in widths), default=0)
+        long = {row.key for row, (*_, note) in zip(self._rows, widths, strict=True) if note > room}
+        narrow = inside < wanted
+        if (narrow, long) != (self._narrow, self._long):
+            self._narrow, self._long = narrow, long
             for row, (key, (_, _, note)) in enumerate(self._labels.items()):
-                self._place(row, note, self._fix[key])
+                self._place(row, note, self._fix[key], key in long)
 
     def rows(self) -> tuple[Row, ...]:
         """What is shown."""
@@ -191,16 +196,17 @@ class ReadoutPanel(QWidget):
         button.setText("Fix")
         button.setObjectName("fix")
         button.clicked.connect(partial(self._apply, key))
-        self._place(row, note, button)
+        self._place(row, note, button, key in self._long)
         button.hide()
         self._fix[key] = button
         self._labels[key] = (name, value, note)
         return name, value, note
 
-    def _place(self, row: int, note: QWidget, button: QWidget) -> None:
+    def _place(self, row: int, note: QWidget, button: QWidget, long: bool) -> None:
         """Each read-out has two lines of the grid, the lower of which is for a range that has no room beside."""
         if self._narrow:
-            self._grid.addWidget(note, 2 * row + 1, 1, 1, 3)
+            first = 0 if long else 1
+            self._grid.addWidget(note, 2 * row + 1, first, 1, 4 - first)
             self._grid.addWidget(button, 2 * row, 2, 1, 2, Qt.AlignmentFlag.AlignLeft)
         else:
             self._grid.addWidget(note, 2 * row, 2)

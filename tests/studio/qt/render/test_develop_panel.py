@@ -18,6 +18,7 @@ from studio.qt.core.session import one_of
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.results.heads import AWAITED, MEASURING, REFINING, heads
 from studio.scan.redevelop import development
+from studio.scan.remarks import frame_remarks
 from tests.studio.qt.small_session import small_session
 
 
@@ -95,6 +96,22 @@ def test_what_is_warned_of_is_of_the_exposure_that_was_measured(qtbot, panel):
             type_into(qtbot, panel.exposure.box, f"{times * exposure:.4f}")
         settle(qtbot, panel)
         assert any("of the scan lines the brightest pixel saturates" in text for text in session.shown.doubts) == told
+
+
+def test_what_saturates_is_counted_in_the_image_that_is_shown_and_told_once(qtbot, panel):
+    """Of one image 14 % of the scan lines were told, as was expected of the light, and 15.8 % of the peaks below it."""
+    session, render = panel.session, panel.session.shown
+    hit, image = np.unique(render.frame.curves[0].index), render.images[0]
+    # so that half of the line saturates
+    times = (image.saturation - image.black_level) / (np.median(image.pixels[hit].max(axis=1)) - image.black_level)
+    with qtbot.waitSignal(session.measured, timeout=20000):
+        type_into(qtbot, panel.exposure.box, f"{1e3 * times * session.project.sensor.exposure_time:.4f}")
+    settle(qtbot, panel)
+    counted = np.mean(render.images[0].pixels[hit].max(axis=1) >= image.saturation)
+    assert 0.1 < counted < 0.95
+    said = frame_remarks(render.measured_as, render.frame, render.measurements, render.doubts)
+    (told,) = [text for text in said if "saturat" in text.lower() and "%" in text]
+    assert f": on {counted:.0%} of the scan lines the brightest pixel saturates" in told
 
 
 def test_dragging_the_slider_is_one_step_of_the_history(qtbot, panel):

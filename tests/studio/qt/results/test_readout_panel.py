@@ -131,3 +131,25 @@ def test_what_goes_with_a_value_is_read_beside_the_button_that_fixes_it(qtbot: Q
         assert note.width() >= note.fontMetrics().horizontalAdvance(note.text()), f"{key}: {note.text()} at {width} px"
         assert not note.geometry().intersects(button.geometry())
         assert content.rect().contains(button.geometry()) and content.width() <= panel.width()
+
+
+@pytest.mark.parametrize("width", [270, 300, 333, 374, 499, 560])
+def test_a_median_and_a_share_of_the_brightest_place_say_which_they_are_and_are_read_whole(
+    qtbot: QtBot, width: int
+) -> None:
+    """A peak of 4,576 e- stood over 90 % of a full well of 10,500 e-. Widths: of windows of 1280, 1440 and 1920 px."""
+    panel = panel_on(qtbot)
+    session = panel._session
+    session.set(("sensor", "speckle"), "polarised")
+    session.set((*LASERS, 0, "power"), 0.03)
+    qtbot.waitUntil(lambda: panel._fix["saturated"].isVisible(), timeout=10_000)
+    panel.resize(width, 900)
+    qtbot.wait(20)
+    (name, value, note), (_, _, share) = panel._labels["peak"], panel._labels["saturated"]
+    assert name.text() == "Median peak signal" and value.text().endswith(" e-")
+    assert share.text().startswith("up to ") and share.text().endswith("% of full well without speckle")
+    assert "the median along the line" in name.toolTip() and "the brightest place" in share.toolTip()
+    for label in (note, share) if width < 300 else (name, note, share):
+        assert label.width() >= label.fontMetrics().horizontalAdvance(label.text()), label.text()
+    content = panel._area.widget()
+    assert content.rect().contains(share.geometry()) and content.width() <= panel.width()
