@@ -29,6 +29,8 @@ FAR = 6.0
 """Robust sigmas from the median beyond which a point is no part of the best fit."""
 PLACE = 5
 """Points whose median is that of a place."""
+UNSURE = 10.0
+"""Times the median sigma of all, from which on a point tells no place."""
 FAR_OFF = "far off: beyond 6 robust sigma of all"
 """What such a point is called."""
 FREE = 0.1
@@ -67,6 +69,18 @@ def off_the_part(points: Float, value: Float, reach: float) -> NDArray[np.bool_]
         distance, _ = scipy.spatial.cKDTree(points[~apart]).query(points[apart], distance_upper_bound=reach)
         apart[apart] = ~np.isfinite(distance)
     return apart
+
+
+def tells_no_place(value: Float, sigma: Float, unsure: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(m,) whose deviation is no number to point at: far off and `unsure`, as of `unsure_of_place`, or much less sure
+    than most points are.
+
+    Of points that are not far off a number is the median: without the unsure ones among them, which are those that
+    deviate least, it would be larger than it is.
+    """
+    with np.errstate(invalid="ignore"):
+        vague = sigma > UNSURE * (np.nanmedian(sigma) if np.isfinite(sigma).any() else np.inf)
+    return np.asarray((far_off(value) & unsure) | vague)
 
 
 @dataclass(frozen=True)

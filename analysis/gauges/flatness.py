@@ -8,12 +8,13 @@ plane is taken away (the reference plane of ISO 12781-1).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.gauges.fit import OUTLIER_SIGMAS, ROUNDS, birge
+from analysis.gauges.one_surface import on_one_surface, together
 from analysis.gauges.profile import ANY_SIGMA, Profile
 from analysis.gauges.spikes import spikes
 from analysis.measures import robust_sigma
@@ -24,11 +25,18 @@ CELLS = 24
 FEWEST_POINTS, USUAL_POINTS = 3, 5
 """Of a cell: of fewer a mean says no more than a point; and as many as there are on average at least."""
 UNSURE = 10.0
-"""Times the region's median sigma, beyond which a point only spoils its cell."""
+"""Times the region's median sigma, beyond which a point only spoils its cell, and a cell the surface."""
+LEAST_SHARE = 0.6
+"""Of the cells of all steps, on one surface: of fewer nobody can say which one is asked for."""
 PARAMETERS = 6
 FEWEST_CELLS, FEWEST_PROFILES = 12, 3
 FLATTEST = 0.02
 """Least width of the cells' places over their length: on narrower ground a second degree across it is not told."""
+TOO_FEW = "too few points in the region of all steps: {}; a scan has more"
+SEVERAL = (
+    "its region holds more than one surface: {:.0f} % of its cells lie on the largest; move its ends, or scan no "
+    "farther than the part"
+)
 JITTER = 1e-9
 """Of a cell's variance, so that cells of exact points have a factor as well."""
 
@@ -49,8 +57,13 @@ class Cells:
     """(c, c) lower triangle."""
     systematic: Float
     """(c, 3, k)."""
-    points: int
-    """In all cells."""
+    count: NDArray[np.intp]
+    """(c,) points in each."""
+
+    @property
+    def points(self) -> int:
+        """In all cells."""
+        return int(self.count.sum())
 
 
 @dataclass(frozen=True)
@@ -61,6 +74,11 @@ class Form:
     sigma_random: float
     sigma_systematic: float
     points: int
+    """Used."""
+    left_out: int
+    """Points of all other cells."""
+    farthest: float
+    """m off the surface, of cells that are of another one, or of none; 0: there are none."""
     theta: Float
     """(6,) coefficients of `_powers` in the frame."""
     centre: Float
@@ -98,7 +116,7 @@ def cells(profile: Profile, region: tuple[float, float], T_part_laser: Float) ->
         direction=direction @ to_part.T,
         factor=np.asarray(np.linalg.cholesky(covariance), dtype=np.float64),
         systematic=np.einsum("ij,cjk->cik", to_part, np.einsum("cm,mjk->cjk", mean, profile.systematic)),
-        points=int(count[full].sum()),
+        count=count[full],
     )
 
 
@@ -108,10 +126,16 @@ def flatness(profiles: Sequence[Cells], like: Form | None = None) -> Form | str:
     A surface flatter than its sigma is found up to some two sigmas less flat than it is, as noise has peaks and valleys
     as well.
     """
-    profiles = [one for one in profiles if len(one.position)]
+    every = [one for one in profiles if len(one.position)]
+    if sum(len(one.position) for one in every) < FEWEST_CELLS:
+        return TOO_FEW.format(sum(one.points for one in every))
+    on = _on_it(every, like)
+    if isinstance(on, str):
+        return on
+    profiles = [taken for one, here in zip(every, on, strict=True) if len((taken := _taken(one, here)).position)]
     position = np.concatenate([np.zeros((0, 3)), *(one.position for one in profiles)])
     if len(position) < FEWEST_CELLS:
-        return f"too few points in the region of all steps: {sum(one.points for one in profiles)}; a scan has more"
+        return TOO_FEW.format(sum(one.points for one in profiles))
     centre = position.mean(axis=0)
     lengths, axes = np.linalg.svd(position - centre, full_matrices=False)[1:]
     if lengths[1] < FLATTEST * lengths[0] or len(profiles) < FEWEST_PROFILES:
@@ -130,24 +154,65 @@ def flatness(profiles: Sequence[Cells], like: Form | None = None) -> Form | str:
         if left == 0 or not wrong.any() or np.count_nonzero(used & ~wrong) < FEWEST_CELLS:
             break
         used &= ~wrong
+    others = np.concatenate([one.position[~here] for one, here in zip(every, on, strict=True)])
     places = local[used, :2] / scale if like is None else like.places
     by_theta = _off_plane(places)
     height = by_theta @ theta
     difference = by_theta[int(np.argmax(height))] - by_theta[int(np.argmin(height))]
     shared = np.concatenate([one.systematic for one in profiles]) if len(profiles) else np.zeros((0, 3, 0))
     off = np.einsum("ni,ij,njk->nk", slope, axes, shared)
+    points = int(np.concatenate([one.count for one in profiles])[used].sum())
     return Form(
         value=float(difference @ theta),
         sigma_random=birge(miss[used], int(np.count_nonzero(used)) - PARAMETERS)
         * float(np.linalg.norm(difference @ solved)),
         sigma_systematic=float(np.linalg.norm(difference @ gain @ off)),
-        points=sum(one.points for one in profiles),
+        points=points,
+        left_out=sum(one.points for one in every) - points,
+        farthest=float(np.abs(_over((others - centre) @ axes.T, scale, theta)).max(initial=0.0)),
         theta=theta,
         centre=centre,
         axes=axes,
         scale=scale,
         places=places,
     )
+
+
+def _on_it(profiles: Sequence[Cells], like: Form | None) -> list[NDArray[np.bool_]] | str:
+    """Which cells of each profile are of the surface that most are of, or of that of a form; or why nobody knows."""
+    position, direction = (
+        np.concatenate([getattr(one, name) for one in profiles]) for name in ("position", "direction")
+    )
+    sigma = np.concatenate([np.linalg.norm(one.factor, axis=1) for one in profiles])
+    if like is not None:
+        here = together(_over((position - like.centre) @ like.axes.T, like.scale, like.theta) / sigma)
+    else:
+        sure = sigma <= UNSURE * float(np.median(sigma))
+        here = sure.copy()
+        here[sure] = on_one_surface(position[sure], direction[sure], sigma[sure])
+        if (share := float(here.sum() / sure.sum())) < LEAST_SHARE:
+            return SEVERAL.format(100.0 * share)
+    return np.split(here, np.cumsum([len(one.position) for one in profiles])[:-1])
+
+
+def _taken(one: Cells, here: NDArray[np.bool_]) -> Cells:
+    """A part of the cells."""
+    if here.all():
+        return one
+    factor = np.linalg.cholesky((one.factor @ one.factor.T)[np.ix_(here, here)])
+    return replace(
+        one,
+        position=one.position[here],
+        direction=one.direction[here],
+        factor=np.asarray(factor, dtype=np.float64),
+        systematic=one.systematic[here],
+        count=one.count[here],
+    )
+
+
+def _over(local: Float, scale: Float, theta: Float) -> Float:
+    """(n,) m, of (n, 3) places in a form's frame over it."""
+    return np.asarray(local[:, 2] - _powers(local[:, :2] / scale) @ theta)
 
 
 def _solve(

@@ -5,11 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from analysis.gauges.flatness import Cells, cells, flatness
+from analysis.gauges.flatness import Cells, Form, cells, flatness
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.profile import Profile
-from analysis.gauges.read import NAN, Reading
+from analysis.gauges.read import MANY, NAN, Reading
 from render.base.arrays import Float
+
+SOME_OFF = "{} of the {} points in its region of all steps are left out, up to {:.4g} mm off the surface"
+MOST_OFF = (
+    "points miss the surface: {} of the {} in its region of all steps are left out, and value and truth are of the "
+    "others alone, as far as they reach"
+)
+OTHER_SURFACE = (
+    "points miss the surface: its region holds another one, {:.4g} mm off it by the exact line; value and truth are of "
+    "the largest, {} of {} points, as far as it reaches"
+)
 
 
 @dataclass(frozen=True)
@@ -41,4 +51,16 @@ def _read(gauge: Gauge, own: list[Patch]) -> Reading:
         return Reading(gauge, None, reason=found)
     truth = flatness([one.truth for one in own], like=found)
     true_value = NAN if isinstance(truth, str) else truth.value
-    return Reading(gauge, None, found.value, found.sigma_random, found.sigma_systematic, found.points, true_value)
+    sigmas = found.sigma_random, found.sigma_systematic
+    remark = _left_out(found, None if isinstance(truth, str) else truth)
+    return Reading(gauge, None, found.value, *sigmas, found.points, true_value, remark=remark)
+
+
+def _left_out(found: Form, truth: Form | None) -> str:
+    """In words, that some of the region is of another surface, or of none; empty: nothing is."""
+    every = found.points + found.left_out
+    if truth is not None and truth.farthest > 0.0:
+        return OTHER_SURFACE.format(1e3 * truth.farthest, found.points, every)
+    if found.left_out > MANY * every:
+        return MOST_OFF.format(found.left_out, every)
+    return SOME_OFF.format(found.left_out, every, 1e3 * found.farthest) if found.farthest > 0.0 else ""

@@ -38,6 +38,8 @@ class DeviationMap:
     lower: float | None = None
     upper: float | None = None
     """Limits of the tolerance; None: none are given."""
+    no_place: NDArray[np.bool_] | None = None
+    """(n,) as of `tells_no_place`; None: of none is it known."""
 
 
 FALSE = 0.01
@@ -87,10 +89,10 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         drawing.grid(False)
         drawing.set(xlabel="mm", ylabel="mm")
         drawing.xaxis.set_major_locator(MaxNLocator(max(1, min(8, round(8.0 * wide / max(tall, 1e-9)))), integer=True))
-        named, apart = _of_the_part(what, place)
+        named, apart, stray = _of_the_part(what, place)
         drawing.set_title(
             f"Deviation from the nominal surface, + outside (too much)\n"
-            f"A number is the median of a place{_without_number(len(place) - len(named))}"
+            f"A number is the median of a place{_without_number(stray, len(place) - len(named))}"
         )
         fine = np.linspace(edges[0], edges[-1], 49) * 1e6
         counts, _ = np.histogram(clipped, fine)
@@ -108,20 +110,23 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         return made
 
 
-def _without_number(count: int) -> str:
+def _without_number(stray: int, count: int) -> str:
     if count == 0:
         return ""
-    return f", {count} stray point{' has' if count == 1 else 's have'} none"
+    return f", {count} stray {'or unsure ' * (count > stray)}point{' has' if count == 1 else 's have'} none"
 
 
-def _of_the_part(what: DeviationMap, place: Float) -> tuple[NDArray[np.int64], float]:
-    """Which points are places of the part, and how far apart those that are numbered are at least, m."""
+def _of_the_part(what: DeviationMap, place: Float) -> tuple[NDArray[np.int64], float, int]:
+    """Which points tell places of the part, how far apart those that are numbered are at least, m, and how many points
+    are stray."""
     if len(place) == 0:
-        return np.zeros(0, dtype=np.int64), 1.0
+        return np.zeros(0, dtype=np.int64), 1.0, 0
     near = ~far_off(what.value)
     extent = np.ptp(place[near] if near.any() else place, axis=0)
     apart = 1e-3 * max(float(np.linalg.norm(extent)) / 6.0, 1e-6)
-    return np.flatnonzero(~off_the_part(what.points, what.value, apart)), apart
+    stray = off_the_part(what.points, what.value, apart)
+    named = ~stray if what.no_place is None else ~(stray | what.no_place)
+    return np.flatnonzero(named), apart, int(stray.sum())
 
 
 def _point_at(axes: Any, what: DeviationMap, place: Float, named: NDArray[np.int64], apart: float) -> None:

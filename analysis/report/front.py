@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.deviation import (
     ABOVE,
@@ -15,6 +16,7 @@ from analysis.deviation import (
     WITHIN,
     far_off,
     sigma_of_deviation,
+    tells_no_place,
     unsure_of_place,
     verdict_of,
     verdicts,
@@ -161,8 +163,7 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
         return {"verdict": "", "mark": "", "rows": table, "note": note}
     lower = -math.inf if told.lower is None else told.lower
     upper = math.inf if told.upper is None else told.upper
-    unsure = unsure_of_place(rows["world"], value, rows["index"], rows["sigma_off_surface"], rows["sigma_depth"])
-    judged = verdicts(rows["world"], value, _sigma(rows), lower, upper, unsure)
+    judged = verdicts(rows["world"], value, _sigma(rows), lower, upper, _unsure(rows))
     shares = {key: float(np.mean(judged == key)) for key in (WITHIN, UNDECIDED, ABOVE, BELOW)}
     ends = ["none" if limit is None else f"{1e6 * limit:+.4g}" for limit in (told.lower, told.upper)]
     limits = f"{' / '.join(ends)}\u00a0µm"
@@ -179,6 +180,11 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
     return {"verdict": verdict, "mark": MARKS[verdict], "rows": table, "note": note}
 
 
+def _unsure(rows: Any) -> NDArray[np.bool_]:
+    sigmas = rows["sigma_off_surface"], rows["sigma_depth"]
+    return unsure_of_place(rows["world"], -rows["off_surface"], rows["index"], *sigmas)
+
+
 def _sigma(rows: Any) -> Float:
     return sigma_of_deviation(rows["sigma_off_surface"], rows["systematic_off_surface"])
 
@@ -187,7 +193,9 @@ def _map(report: ReportInput, rows: Any) -> str:
     eye = report.scene.T_world_camera(report.record.steps[0].step)[:3, 3]
     told = report.delivery
     towards = eye - rows["world"].mean(axis=0)
-    return png_uri(draw(DeviationMap(rows["world"], -rows["off_surface"], towards, told.lower, told.upper)))
+    value = -rows["off_surface"]
+    no_place = tells_no_place(value, _sigma(rows), _unsure(rows))
+    return png_uri(draw(DeviationMap(rows["world"], value, towards, told.lower, told.upper, no_place)))
 
 
 def _how(report: ReportInput, rows: Any) -> list[tuple[str, str]]:

@@ -29,6 +29,7 @@ from analysis.deviation import (
     deviations,
     far_off,
     sigma_of_deviation,
+    tells_no_place,
     three_two_one,
     turn_and_shift,
     unsure_of_place,
@@ -109,6 +110,8 @@ class Compared:
     """(3,) from the part to the camera, on the whole."""
     left_out: int
     """Points of other objects."""
+    no_place: NDArray[np.bool_]
+    """(m,) as of `tells_no_place`."""
     nominal_unit: Unit | None = None
     """That its file was read in; None: the part as it was scanned, or a file that tells it."""
     nominal_over_part: float = 1.0
@@ -211,14 +214,14 @@ def compare_cloud(scene: Scene, root: Path, cloud: Cloud, question: Question) ->
     elif question.alignment == "3-2-1":
         aligned = three_two_one(points, vertices, triangles, question.datums, question.datum_radius)
     made = deviations(points, eyes, vertices, triangles, aligned)
-    judged = None
+    judged, unsure = None, _unsure(cloud, points, made.value, here)
     if question.lower is not None or question.upper is not None:
-        unsure = _unsure(cloud, points, made.value, here)
         judged = verdicts(made.points, made.value, sigma, *question.limits, unsure)
     columns = {name: cloud[name][here] for name in ("laser", "step", "row")}
     towards = (eyes - points).mean(axis=0)
     others, is_bound = int(np.count_nonzero(~here)), not bool(known_normal[here].all())
-    return Compared(made, sigma, judged, columns, question, towards, others, unit, over_part, is_bound)
+    no_place = tells_no_place(made.value, sigma, unsure)
+    return Compared(made, sigma, judged, columns, question, towards, others, no_place, unit, over_part, is_bound)
 
 
 def write_deviation(what: Compared, path: Path, reads: Sequence[Path] = ()) -> list[Path]:
@@ -250,7 +253,7 @@ def write_deviation(what: Compared, path: Path, reads: Sequence[Path] = ()) -> l
 def map_of(what: Compared) -> DeviationMap:
     """What is drawn of it."""
     asked = what.question
-    return DeviationMap(what.found.points, what.found.value, what.towards, asked.lower, asked.upper)
+    return DeviationMap(what.found.points, what.found.value, what.towards, asked.lower, asked.upper, what.no_place)
 
 
 def _scanned(

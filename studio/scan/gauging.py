@@ -95,8 +95,9 @@ def kept_readings(gauges: Sequence[Gauge], scanned: Sequence[Gauge], rows: objec
             if (was.kind, was.laser, was.regions) == (gauge.kind, gauge.laser, gauge.regions):
                 names = ("value", "sigma_random", "sigma_systematic", "truth")
                 value, random, systematic, truth = (_number(row.get(name)) for name in names)
-                points, reason = int(np.nan_to_num(_number(row.get("points")))), str(row.get("reason") or "")
-                found[gauge] = Reading(gauge, None, value, random, systematic, points, truth, reason)
+                points = int(np.nan_to_num(_number(row.get("points"))))
+                reason, remark = (str(row.get(name) or "") for name in ("reason", "remark"))
+                found[gauge] = Reading(gauge, None, value, random, systematic, points, truth, reason, remark)
     return found
 
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from analysis.gauges.flatness import CELLS, Cells, Form, cells, flatness
-from analysis.gauges.of_scan import patch, read_scan
+from analysis.gauges.of_scan import Patch, patch, read_scan
+from analysis.gauges.one_surface import together
+from analysis.gauges.read import Reading
+from analysis.report.gauge_table import verdict_text
 from tests.analysis.gauges.profiles import ACROSS, gauge, noises, profile
 
 REGION = (-0.01, 0.01)
@@ -110,3 +115,62 @@ def test_readings_of_a_scan_come_once_with_their_truth() -> None:
     assert abs(found.error_in_sigmas) < 4.0
     assert found.truth == pytest.approx(form(scan(5e-5, None)).value, rel=1e-3)
     assert all(len(each.measured.position) <= CELLS for each in kept)
+
+
+def beyond_the_part(kind: str, noise: np.ndarray | None, seed: int) -> list[Cells]:
+    """Five steps of the table, 52 mm below the surface, or of a step of stray points alone, or none."""
+    random, far = np.random.default_rng(seed), places(21)[-1]
+    if kind == "stray":
+        height = saddle(0.0, 0.0) + random.uniform(-4.6, 0.3, len(ACROSS))
+        return [cells(profile(height, 5e-5), REGION, pose(far + PITCH))]
+    steps = range(5) if kind == "table" else ()
+    return [
+        cells(profile(saddle(0.0, 0.0) - 0.052, SIGMA, 1.0, None if noise is None else noise[k]), REGION, pose(far + y))
+        for k, y in enumerate(PITCH * (1.0 + k) for k in steps)
+    ]
+
+
+def read_of(measured: list[Cells], truth: list[Cells]) -> Reading:
+    one = gauge("flatness", nominal=0.0, upper=1e-3)
+    (found,) = read_scan([Patch(one, *both) for both in zip(measured, truth, strict=True)])
+    return found
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [("none", ""), ("stray", "points in its region of all steps are left out, up to"), ("table", "holds another one")],
+)
+def test_what_lies_beyond_the_part_is_no_part_of_its_flatness(kind: str, told: str) -> None:
+    """A scan that went on over the table had a flatness of 1763 mm, of a part 52 mm high, and its truth was 1797 mm."""
+    noise, unseen = noises(26, 1.0, 41), cells(profile(ACROSS), (1.0, 2.0), pose(0.0))
+    clean, exact = scan(5e-5, noise), scan(5e-5, None)
+    before = form(clean)
+    beyond = beyond_the_part(kind, noise, 7)
+    seen = beyond_the_part(kind, None, 7) if kind == "table" else [unseen] * len(beyond)
+    found = read_of(clean + beyond, exact + seen)
+    assert found.value == pytest.approx(before.value, rel=1e-9) and found.sigma == pytest.approx(before.sigma_random)
+    assert found.truth == pytest.approx(form(exact, before).value, rel=1e-9) and found.points == before.points
+    assert told in found.remark and bool(told) == bool(found.remark)
+    assert ("misfit" in verdict_text(found.verdict, remark=found.remark)) == (kind == "table")
+
+
+def test_a_region_of_two_surfaces_alike_has_no_flatness_and_says_why() -> None:
+    half = scan(5e-5, noises(21, 1.0, 3))
+    lowered = [replace(one, position=one.position - [0.0, 0.0, 0.01]) for one in half[::2]]
+    told = flatness(lowered + half[1::2])
+    assert isinstance(told, str) and "more than one surface: 52 % of its cells" in told
+
+
+@pytest.mark.parametrize("radius", [0.012, 0.05, 1.0])
+def test_a_surface_that_bends_on_is_one_and_is_no_stray_at_its_ends(radius: float) -> None:
+    """Of a round bar the form of second degree leaves much over, but no leap: all of its cells are of it."""
+    height = -0.5 + np.sqrt(radius**2 - np.minimum(ACROSS**2, (0.99 * radius) ** 2))
+    noise = noises(21, 1.0, 8)
+    bar = [cells(profile(height, SIGMA, 1.0, noise[k]), REGION, pose(y)) for k, y in enumerate(places(21))]
+    assert form(bar).farthest == 0.0
+
+
+def test_the_misses_of_a_surface_end_at_a_leap() -> None:
+    grown = 1.4 ** np.arange(20.0)
+    assert together(grown).all() and together(0.1 * grown).all()
+    assert np.array_equal(together(np.append(grown, -4e3)), np.append(np.ones(20, dtype=bool), False))

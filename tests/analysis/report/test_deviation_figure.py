@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analysis.deviation import tells_no_place, unsure_of_place
 from analysis.report.deviation_figure import BANDS, DeviationMap, draw, levels
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -40,6 +41,31 @@ def test_far_off_points_beside_the_part_are_counted_and_a_dent_is_pointed_at(cou
     assert [one.get_text() for one in made.axes[0].texts] == ["1: -300 µm"]
     told = {0: "", 1: ", 1 stray point has none", 7: ", 7 stray points have none"}[count]
     assert made.axes[0].get_title(loc="left").partition("\n")[2] == f"A number is the median of a place{told}"
+
+
+@pytest.mark.parametrize("kind", ["alone on their scan lines", "much less sure than most"])
+def test_stray_points_beside_the_part_have_no_number_and_a_dent_beside_them_has(kind: str) -> None:
+    """ "1: -3250 µm" stood in the report of a part against itself, over points that its last profile only grazes."""
+    random, pitch, rows = np.random.default_rng(4), 5e-4, 60
+    x, y = (one.ravel() for one in np.meshgrid(np.arange(20) * 5e-3, np.arange(rows) * pitch, indexing="ij"))
+    scan_line = np.ravel(1000 * np.arange(20)[:, None] + np.arange(rows))
+    value, sigma = 5e-6 * random.standard_normal(len(x)), np.full(len(x), 5e-6)
+    dent = (np.abs(x - 0.03) < 7e-3) & (np.abs(y - 0.015) < 8e-3)
+    value[dent] = -3e-4
+    apart = np.arange(0, rows, 2) if kind.startswith("alone") else np.arange(20, 40)
+    there = np.column_stack([x, y, value])
+    stray = np.column_stack([np.full(len(apart), 0.1), apart * pitch, np.full(len(apart), -3.25e-3)])
+    points, value = (
+        np.concatenate([there, stray]),
+        np.append(value, stray[:, 2] + 1e-5 * random.standard_normal(len(apart))),
+    )
+    scan_line = np.append(scan_line, 20_000 + apart)
+    sigma = np.append(sigma, np.full(len(apart), 5e-6 if kind.startswith("alone") else 1e-3))
+    unsure = unsure_of_place(points, value, scan_line, sigma, sigma)
+    made = draw(DeviationMap(points, value, UP, -5e-5, 5e-5, tells_no_place(value, sigma, unsure)))
+    assert [one.get_text() for one in made.axes[0].texts] == ["1: -300 µm"]
+    title = made.axes[0].get_title(loc="left").partition("\n")[2]
+    assert title == f"A number is the median of a place, {len(apart)} stray or unsure points have none"
 
 
 @pytest.mark.parametrize("is_tall", [False, True])

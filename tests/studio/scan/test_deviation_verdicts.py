@@ -12,17 +12,18 @@ from analysis.cloud import cloud
 from analysis.deviation import ABOVE, BELOW, UNDECIDED, WITHIN
 from analysis.error import compare
 from analysis.report.delivery import Delivery
+from analysis.report.deviation_figure import DeviationMap, draw
 from analysis.report.front import front
 from analysis.report.units import percent
 from render.base.pose import Pose
 from render.scene.scene import Scene
-from studio.scan.deviation import Question, compare_cloud
+from studio.scan.deviation import Question, compare_cloud, map_of
 from tests.analysis.report.test_report import DEPTH, WALL, WALL_TRIANGLES, make_frames, report_of
 
 
 @pytest.mark.parametrize("limits", [(-2e-3, 2e-3), (-4e-3, 4e-3), (None, 5e-4), (3e-3, None)])
 def test_report_and_window_give_the_same_points_the_same_verdicts(
-    limits: tuple[float | None, float | None], tmp_path: Path
+    limits: tuple[float | None, float | None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene, frames = make_frames()
     (laser,) = frames[0].lasers
@@ -36,6 +37,8 @@ def test_report_and_window_give_the_same_points_the_same_verdicts(
     frame = replace(frames[0], lasers=(replace(laser, extractions=(replace(made, points=points, errors=errors),)),))
     lower, upper = limits
     report = replace(report_of(scene, [frame]), delivery=Delivery(customer="Ada", lower=lower, upper=upper))
+    maps: list[DeviationMap] = []
+    monkeypatch.setattr("analysis.report.front.draw", lambda what: (maps.append(what), draw(what))[1])
     told = front(report)
     assert told is not None
     rows = dict(told["surface"]["rows"])
@@ -52,6 +55,8 @@ def test_report_and_window_give_the_same_points_the_same_verdicts(
     assert {key: rows[name] for key, name in named.items()} == judged
     assert found.record["verdict"] == told["surface"]["verdict"]
     assert not found.sigma_is_bound
+    # and their maps number the same points
+    np.testing.assert_array_equal(maps[0].no_place, map_of(found).no_place)
     size = dict(told["how"])["Uncertainty of a point, two sigma"]
     assert size.endswith("along the normal, median of 100 points (laser)")
     assert float(size.split()[0]) == pytest.approx(2e6 * found.record["median_sigma"], rel=1e-2)

@@ -260,6 +260,8 @@ def test_a_scan_has_one_flatness_which_is_kept_for_who_looks_at_it(tmp_path: Pat
     elsewhere = wider.model_copy(update={"regions": ((-0.05, 0.05),)})
     kept = kept_readings([wider, elsewhere], project.measures, record)
     assert list(kept) == [wider] and kept[wider].value == pytest.approx(float(row["value"]))
+    told = kept_readings([wider], project.measures, [{}, {**record[1], "remark": "points miss the surface"}])
+    assert told[wider].remark == "points miss the surface", "what is amiss with it is seen in the window as well"
     assert kept_readings([wider], project.measures, [{"value": "damaged"}, None])[wider].reason == ""
     assert kept_readings([wider], project.measures, "damaged") == {}
 
