@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -56,6 +57,8 @@ class Profile:
     section: Section = Section()
     strength: Float | None = None
     """(m,) electrons at the line's peak; None: a point is of its scan line's middle alone, as on the exact line."""
+    ground: NDArray[np.bool_] | None = None
+    """(m,) points on the plane that parts stand on; None: it is not known."""
     fitted: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     """The curves that were fitted to it so far, for whoever reads and then draws them; by kind and regions."""
 
@@ -147,16 +150,23 @@ def measured_profile(
     )
 
 
-def true_profile(curve: LaserCurve, T_section_camera: Float, measured: Profile) -> Profile:
-    """The exact line, where it is lit; its points weigh as the measured ones beside them."""
-    position = _in_section(T_section_camera, curve.point[curve.irradiance > 0.0])
+def true_profile(
+    curve: LaserCurve, T_section_camera: Float, measured: Profile, ground: Collection[int] = ()
+) -> Profile:
+    """The exact line, where it is lit; its points weigh as the measured ones beside them.
+
+    ground: objects that parts stand on, as of the curve's `object_id`.
+    """
+    lit = curve.irradiance > 0.0
+    position = _in_section(T_section_camera, curve.point[lit])
     order = np.argsort(measured.position[:, 0], kind="stable")
     weight = np.tile([0.0, ANY_SIGMA], (len(position), 1))
     if len(order):
         across = measured.position[order, 0]
         weight = np.stack([np.interp(position[:, 0], across, measured.random[order, k]) for k in (0, 1)], axis=1)
-    index = np.asarray(curve.index[curve.irradiance > 0.0], dtype=np.intp)
-    return Profile(position, weight, np.zeros((len(position), 2, 0)), index, np.ones(len(position)))
+    index, on_ground = np.asarray(curve.index[lit], dtype=np.intp), np.isin(curve.object_id[lit], list(ground))
+    systematic, alone = np.zeros((len(position), 2, 0)), np.ones(len(position))
+    return Profile(position, weight, systematic, index, alone, ground=on_ground)
 
 
 def _in_section(T_section_camera: Float, camera: Float) -> Float:
