@@ -135,7 +135,9 @@ def measured_profile(
     shared = [] if points.calibration is None else [np.einsum("ij,mjk->mik", to_section, points.calibration[order])]
     if errors is not None:
         shared.append((by_pixel * np.nan_to_num(errors.sheet_bias[order])[:, None])[:, :, None])
-        normal = np.where(errors.outlier[order, None], np.nan, errors.normal[order]) @ T_section_camera[:3, :3].T
+        # of a false point it is that of whatever face is nearest
+        unknown = errors.outlier[order] | (errors.truth[order] < 0)
+        normal = np.where(unknown[:, None], np.nan, errors.normal[order]) @ T_section_camera[:3, :3].T
     place = transform_points(T_section_camera, points.camera[order])
     return Profile(
         position=np.stack([place[:, 1], -place[:, 2]], axis=1),

@@ -137,7 +137,8 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
         remark = f"{remark}; {AS_DRAGGED}" if remark else AS_DRAGGED
     one = Reading(gauge, step, value, random, systematic, int(used), true, "", remark, stray=stray)
     ground = () if truth is None else on_ground(gauge, truth)
-    return replace(_beside_square(one, measured), section=measured.section.name, ground=ground)
+    one = one if stray else _beside_square(one, measured)
+    return replace(one, section=measured.section.name, ground=ground)
 
 
 def _between_middles(gauge: Gauge) -> float:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -97,6 +98,11 @@ def test_a_profile_knows_how_strong_its_line_is_and_the_exact_one_is_of_the_midd
     measured, exact = profiles(project, frame, Measurement(0, 0, image, line, points, errors), "laser_plane")
     assert measured.strength is not None and exact.strength is None
     assert measured.strength == pytest.approx(line.amplitude[measured.index, 0]) and len(measured.index) > 20
+    # of a point that no exact line is beside, the nearest face is any
+    assert measured.normal is not None and np.isfinite(measured.normal[1:-1]).all()
+    alone = replace(errors, truth=np.where(np.arange(len(errors.truth)) % 2, errors.truth, -1))
+    measured, _ = profiles(project, frame, Measurement(0, 0, image, line, points, alone), "laser_plane")
+    assert measured.normal is not None and np.isnan(measured.normal).any(axis=1).mean() == pytest.approx(0.5, abs=0.1)
 
 
 def table(folder: Path) -> list[dict[str, str]]:
