@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 from analysis.gauges.flatness import Cells, Form, cells, flatness
 from analysis.gauges.gauge import Gauge
+from analysis.gauges.parts import on_ground
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import MANY, NAN, Reading
 from render.base.arrays import Float
 
+BESIDE = "in {} of the steps its region lies on the plane that parts stand on: these are left out"
 SOME_OFF = "{} of the {} points in its region of all steps are left out, up to {:.4g} mm off the surface"
 MOST_OFF = (
     "points miss the surface: {} of the {} in its region of all steps are left out, and value and truth are of the "
@@ -29,12 +31,15 @@ class Patch:
     gauge: Gauge
     measured: Cells
     truth: Cells
+    on_ground: bool = False
+    """The exact line lies on nothing there but what parts stand on."""
 
 
 def patch(gauge: Gauge, measured: Profile, truth: Profile, measured_pose: Float, true_pose: Float) -> Patch:
     """Of the profiles of the measure's laser; poses: (4, 4) of the laser on the part, T_part_laser, of each."""
     region = gauge.regions[0]
-    return Patch(gauge, cells(measured, region, measured_pose), cells(truth, region, true_pose))
+    both = cells(measured, region, measured_pose), cells(truth, region, true_pose)
+    return Patch(gauge, *both, bool(on_ground(gauge, truth)))
 
 
 def read_scan(patches: Iterable[Patch]) -> tuple[Reading, ...]:
@@ -45,14 +50,20 @@ def read_scan(patches: Iterable[Patch]) -> tuple[Reading, ...]:
     return tuple(_read(gauge, own) for gauge, own in of.items())
 
 
-def _read(gauge: Gauge, own: list[Patch]) -> Reading:
+def _read(gauge: Gauge, every: list[Patch]) -> Reading:
+    """Where most of the steps are beyond the part, the table would be the surface that most points are of."""
+    seen = [one for one in every if len(one.truth.position)]
+    beside = {id(one) for one in seen if one.on_ground}
+    beside = beside if len(beside) < len(seen) else set()
+    own = [one for one in every if id(one) not in beside]
     found = flatness([one.measured for one in own])
     if isinstance(found, str):
         return Reading(gauge, None, reason=found)
     truth = flatness([one.truth for one in own], like=found)
     true_value = NAN if isinstance(truth, str) else truth.value
     sigmas = found.sigma_random, found.sigma_systematic
-    remark = _left_out(found, None if isinstance(truth, str) else truth)
+    told = _left_out(found, None if isinstance(truth, str) else truth), BESIDE.format(len(beside)) if beside else ""
+    remark = "; ".join(filter(None, told))
     return Reading(gauge, None, found.value, *sigmas, found.points, true_value, remark=remark)
 
 

@@ -9,8 +9,9 @@ from analysis.gauges.area import section, section_points, without_unsure
 from analysis.gauges.edge import Edge, dimension
 from analysis.gauges.fit import Fit
 from analysis.gauges.gauge import Gauge
+from analysis.gauges.parts import parts_of
 from analysis.gauges.profile import Profile
-from analysis.gauges.read import crossing, curves_of, far_point, line_of, parts_of
+from analysis.gauges.read import crossing, curves_of, far_point, line_of
 from analysis.gauges.undetermined import undetermined
 from render.base.arrays import Float
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -59,6 +60,8 @@ class Profile:
     """(m,) electrons at the line's peak; None: a point is of its scan line's middle alone, as on the exact line."""
     true_section: TrueSection | None = None
     """Of the part, by which edges of the exact line are known; None: these are points, which do not tell of it."""
+    ground: NDArray[np.bool_] | None = None
+    """(m,) points on the plane that parts stand on; None: it is not known."""
     fitted: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     """The curves that were fitted to it so far, for whoever reads and then draws them; by kind and regions."""
 
@@ -136,7 +139,9 @@ def measured_profile(
     shared = [] if points.calibration is None else [np.einsum("ij,mjk->mik", to_section, points.calibration[order])]
     if errors is not None:
         shared.append((by_pixel * np.nan_to_num(errors.sheet_bias[order])[:, None])[:, :, None])
-        normal = np.where(errors.outlier[order, None], np.nan, errors.normal[order]) @ T_section_camera[:3, :3].T
+        # of a false point it is that of whatever face is nearest
+        unknown = errors.outlier[order] | (errors.truth[order] < 0)
+        normal = np.where(unknown[:, None], np.nan, errors.normal[order]) @ T_section_camera[:3, :3].T
     place = transform_points(T_section_camera, points.camera[order])
     return Profile(
         position=np.stack([place[:, 1], -place[:, 2]], axis=1),
@@ -152,21 +157,27 @@ def measured_profile(
 
 
 def true_profile(
-    curve: LaserCurve, T_section_camera: Float, measured: Profile, part: TrueSection | None = None
+    curve: LaserCurve,
+    T_section_camera: Float,
+    measured: Profile,
+    part: TrueSection | None = None,
+    ground: Collection[int] = (),
 ) -> Profile:
     """The exact line, where it is lit; its points weigh as the measured ones beside them.
 
-    part: in the same section; without it no edge has a true end.
+    part: in the same section; without it no edge has a true end. ground: objects that parts stand on, as of the
+    curve's `object_id`.
     """
-    position = _in_section(T_section_camera, curve.point[curve.irradiance > 0.0])
+    lit = curve.irradiance > 0.0
+    position = _in_section(T_section_camera, curve.point[lit])
     order = np.argsort(measured.position[:, 0], kind="stable")
     weight = np.tile([0.0, ANY_SIGMA], (len(position), 1))
     if len(order):
         across = measured.position[order, 0]
         weight = np.stack([np.interp(position[:, 0], across, measured.random[order, k]) for k in (0, 1)], axis=1)
-    index = np.asarray(curve.index[curve.irradiance > 0.0], dtype=np.intp)
-    none = np.zeros((len(position), 2, 0))
-    return Profile(position, weight, none, index, np.ones(len(position)), true_section=part or TrueSection())
+    index, on_ground = np.asarray(curve.index[lit], dtype=np.intp), np.isin(curve.object_id[lit], list(ground))
+    systematic, alone, true = np.zeros((len(position), 2, 0)), np.ones(len(position)), part or TrueSection()
+    return Profile(position, weight, systematic, index, alone, true_section=true, ground=on_ground)
 
 
 def _in_section(T_section_camera: Float, camera: Float) -> Float:

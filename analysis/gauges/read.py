@@ -20,6 +20,7 @@ from analysis.gauges.oblique import (
     running_along,
     square_profile,
 )
+from analysis.gauges.parts import is_stray, on_ground, parts_of
 from analysis.gauges.profile import Profile
 from analysis.gauges.undetermined import undetermined
 from render.base.arrays import Float
@@ -49,12 +50,10 @@ AS_DRAGGED = (
     "its ends are the middles of its regions, where they were put: along the profile nothing is measured; of edges "
     "take Edge to edge"
 )
+ANYWHERE = 100.0
+"""In SI units, of a value from which on its last digits tell nothing."""
 STRAIGHTEST = 10.0
 """Lengths of its region, of the radius of an edge: beyond, the points are those of a flat side."""
-SPARE = 2
-"""Points that a curve needs beyond its parameters."""
-PARAMETERS = {"radius": 3, "straightness": 3, "peak": 3, "gap": 3}
-"""Of the curve in the last region; elsewhere, and in the others, lines."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +83,10 @@ class Reading:
     """The value in a section square to them, of the same points; NaN where `oblique` is."""
     section: str = ""
     """Of which it was read, in words."""
+    stray: bool = False
+    """As of `is_stray`."""
+    ground: tuple[str, ...] = ()
+    """As of `on_ground`."""
 
     @property
     def sigma(self) -> float:
@@ -100,8 +103,8 @@ class Reading:
 
     @property
     def verdict(self) -> Verdict | None:
-        """As of `Gauge.verdict`."""
-        return self.gauge.verdict(self.value, self.sigma)
+        """As of `Gauge.verdict`; None of stray light as well."""
+        return None if self.stray else self.gauge.verdict(self.value, self.sigma)
 
 
 def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> Reading:
@@ -122,18 +125,20 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
         hidden = unseen(measured, gauge.regions[1], fits[0].frame)
         systematic, remark = math.hypot(systematic, hidden.sigma), hidden.remark
         remark += NO_TRUTH if remark and math.isnan(true) else ""
-    elif truth is not None and isinstance(parts_of(gauge, truth), str):
-        remark = STRAY
     elif edges:
         seen = "; ".join(one.remark for one in edges if one.remark)
         remark = _without_ends(gauge, truth) if truth is not None and math.isnan(true) else seen
+    stray = truth is not None and is_stray(gauge, measured, truth)
+    remark = STRAY if stray else remark
     if not remark and ratio > MISFIT:
         remark = MISFITS.get(gauge.kind, OTHER_SHAPE).format(ratio)
     remark = remark or _swapped(gauge) or _left_out(gauge, measured, fits)
     if gauge.kind == "point_to_point" and value < math.sqrt(2.0) * _between_middles(gauge):
         remark = f"{remark}; {AS_DRAGGED}" if remark else AS_DRAGGED
-    one = Reading(gauge, step, value, random, systematic, int(used), true, "", remark)
-    return replace(_beside_square(one, measured), section=measured.section.name)
+    one = Reading(gauge, step, value, random, systematic, int(used), true, "", remark, stray=stray)
+    ground = () if truth is None else on_ground(gauge, truth)
+    one = one if stray else _beside_square(one, measured)
+    return replace(one, section=measured.section.name, ground=ground)
 
 
 def _between_middles(gauge: Gauge) -> float:
@@ -180,7 +185,7 @@ def _beside_square(one: Reading, profile: Profile) -> Reading:
     change = math.remainder(value - one.value, math.tau) if one.gauge.unit == "rad" else value - one.value
     if not abs(change) > one.sigma:
         return one
-    return _told(one, oblique_remark(profile, along, _in_words(value, one.gauge.unit)), obliquity(along), value)
+    return _told(one, oblique_remark(profile, along, in_words(value, one.gauge.unit)), obliquity(along), value)
 
 
 def _beside_ball(one: Reading, profile: Profile, used: Float) -> Reading:
@@ -194,8 +199,8 @@ def _beside_ball(one: Reading, profile: Profile, used: Float) -> Reading:
     radius = one.value / math.cos(lean)
     if not abs(radius - one.value) > one.sigma:
         return one
-    aside = _in_words(one.value * math.tan(lean), "m")
-    own = f"the sheet passes the middle of the ball by {aside}, whose own radius is {_in_words(radius, 'm')}"
+    aside = in_words(one.value * math.tan(lean), "m")
+    own = f"the sheet passes the middle of the ball by {aside}, whose own radius is {in_words(radius, 'm')}"
     return _told(one, f"{own}; aim the laser at it", lean, radius)
 
 
@@ -203,9 +208,10 @@ def _told(one: Reading, told: str, oblique: float, square: float = NAN) -> Readi
     return replace(one, remark=f"{told}; {one.remark}" if one.remark else told, oblique=oblique, square=square)
 
 
-def _in_words(value: float, unit: str) -> str:
+def in_words(value: float, unit: str) -> str:
+    """With its unit: mm, mm² or degrees."""
     scale, name, places = {"m": (1e3, " mm", 4), "rad": (180.0 / math.pi, "°", 2), "m2": (1e6, " mm²", 3)}[unit]
-    return f"{scale * value:.{places}f}{name}"
+    return f"{scale * value:.{places}f}{name}" if abs(value) < ANYWHERE else f"{scale * value:.3g}{name}"
 
 
 def _true_value(gauge: Gauge, truth: Profile | None) -> float:
@@ -224,17 +230,6 @@ def _without_ends(gauge: Gauge, truth: Profile) -> str:
     fits = [] if isinstance(parts, str) else curves_of(gauge, truth, parts)[0]
     unknown = [one.remark for one in fits if isinstance(one, Edge) and one.remark and not one.why]
     return "; ".join(unknown) if unknown else NOT_IN_TRUTH
-
-
-def parts_of(gauge: Gauge, profile: Profile) -> list[Float] | str:
-    """The weights (m,) of the points in each region, or why they are too few."""
-    parts = [profile.weight(*region) for region in gauge.regions]
-    for name, part, region in zip(REGIONS[gauge.kind], parts, gauge.regions, strict=True):
-        least = PARAMETERS.get(gauge.kind, 2) + SPARE
-        if (there := np.count_nonzero(part)) < least:
-            where = f"{region[0] * 1e3:.6g} to {region[1] * 1e3:.6g} mm"
-            return f"too few points in the region {name!r} ({where}): {there}; at least {least} are needed"
-    return parts
 
 
 def _value(gauge: Gauge, profile: Profile) -> tuple[float, Float, list[Fit]] | str:

@@ -23,7 +23,7 @@ from analysis.deviation import (
 )
 from analysis.distance import nearest_triangle
 from analysis.report.deviation_figure import DeviationMap, draw
-from analysis.report.gauge_table import MARKS
+from analysis.report.gauge_table import MARKS, counts_text
 from analysis.report.model import ReportInput
 from analysis.report.style import png_uri
 from analysis.report.total import total
@@ -68,7 +68,7 @@ def front(report: ReportInput) -> dict[str, Any] | None:
         "verdict": verdict,
         "verdict_text": VERDICTS[verdict],
         "judged": _judged(bool(surface["verdict"]), gauges, judged_objects(report)),
-        "decided_by": _decided_by(verdict, surface["verdict"], gauges, [str(row["name"]) for row in report.measures]),
+        "decided_by": _decided_by(verdict, surface["verdict"], gauges, [_named(row) for row in report.measures]),
         "part_of": report.part_of,
         "rule": RULE if verdict != "none" else "",
         "surface": surface,
@@ -116,6 +116,12 @@ def _gauge_verdict(row: dict[str, Any]) -> str:
     if row["lower"] is None and row["upper"] is None:
         return ""
     return "undecided" if row["reason"] else str(row["verdict"] or "undecided")
+
+
+def _named(row: dict[str, Any]) -> str:
+    """A measure's name; of one of several steps that are not all alike, with how many came to what."""
+    counts = row.get("verdicts") or {}
+    return f"{row['name']} ({counts_text(counts)})" if len(counts) > 1 else str(row["name"])
 
 
 def _judged(surface: bool, gauges: list[str], objects: str) -> str:

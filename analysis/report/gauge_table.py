@@ -115,7 +115,9 @@ def verdict_of(row: Mapping[str, Any]) -> str:
     if row["reason"]:
         return f"not measured in any of {steps} steps" if steps > 1 else "not measured"
     told = marked_verdict(row)
-    return f"{told}: {counts_text(counts)}" if steps > 1 and set(counts) - {"no tolerance"} else told
+    if steps <= 1 or not set(counts) - {"no tolerance"}:
+        return told
+    return counts_text(counts) if told == NONE else f"{told}: {counts_text(counts)}"
 
 
 def worst_of(row: Mapping[str, Any]) -> str:
@@ -128,6 +130,19 @@ def worst_of(row: Mapping[str, Any]) -> str:
     else:
         what = f"farthest off the {'truth' if row['nominal'] is None else 'nominal'}{' of those measured' * some}"
     return f"{what}: step {row['step'] + 1} of {row['readings']}"
+
+
+def over_steps_of(row: Mapping[str, Any]) -> str:
+    """What the measured steps of such an entry come to, of which the worst says nothing; empty: one at most."""
+    found = row.get("over_steps")
+    if not found:
+        return ""
+    some, every = found["measured"], row["readings"]
+    scale, name = scale_and_unit(row["unit"])
+    places = decimals(found["sigma"], row["unit"])
+    median, least, largest = (f"{scale * found[key]:.{places}f}" for key in ("median", "least", "largest"))
+    steps = f"{every} steps" if some == every else f"{some} of {every} steps that were measured"
+    return f"median {median}{name}, from {least} to {largest}{name}, over the {steps}"
 
 
 def marked_verdict(row: Mapping[str, Any]) -> str:
@@ -165,6 +180,13 @@ def counts_text(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{counts[name]} {names.get(name, name)}" for name in COUNTED if counts.get(name))
 
 
+def _first_of(row: Mapping[str, Any]) -> str:
+    """Which of the steps without a value their reason is told of, where there are several; empty: records of former
+    versions do not say."""
+    first = row.get("first_missing")
+    return f", first in step {first + 1}" if first is not None and row["verdicts"]["none"] > 1 else ""
+
+
 def plain_cells(row: Mapping[str, Any]) -> list[str]:
     """The same for a terminal, which may know ASCII alone."""
     return [cell.translate(PLAIN).strip() for cell in cells(row)]
@@ -176,11 +198,17 @@ def definitions(rows: list[dict[str, Any]]) -> list[str]:
     return [text for kind, text in DEFINITIONS.items() if kind in kinds]
 
 
+def over_steps(rows: list[dict[str, Any]]) -> list[str]:
+    """The same of all of them, a sentence each."""
+    return [f"{row['name']}: {text}" for row in rows if (text := over_steps_of(row))]
+
+
 def reasons(rows: list[dict[str, Any]]) -> list[str]:
     """Why measures have no value, and what their sigmas do not know of, a sentence each."""
     told = [f"{row['name']} is not measured: {row['reason']}" for row in rows if row["reason"]]
     told += [
-        f"{row['name']} is not measured in {row['verdicts']['none']} of {row['readings']} steps: {row['first_reason']}"
+        f"{row['name']} is not measured in {row['verdicts']['none']} of {row['readings']} steps"
+        f"{_first_of(row)}: {row['first_reason']}"
         for row in rows
         if row.get("first_reason") and not row["reason"]
     ]

@@ -11,6 +11,7 @@ import numpy as np
 
 from analysis.gauges.of_scan import Patch, read_scan
 from analysis.gauges.read import Reading
+from analysis.gauges.steps import over_steps
 from analysis.measures import Measures
 from analysis.report.frame_result import FrameResult, frame_rmse
 from analysis.report.sample import IMAGE, MOST_LINES, ROW, Rows, Sample, rows_of
@@ -90,10 +91,10 @@ class ScanRecord:
 
     @property
     def readings(self) -> list[Reading]:
-        """Of the project's measures: in the order of the steps, then those of all steps."""
+        """Of the project's measures: in the order of the steps, as of `over_steps`, then those of all steps."""
         if self._of_all is None:
             self._of_all = read_scan(self._patches)
-        return [*self._readings, *self._of_all]
+        return [*over_steps(self._readings), *self._of_all]
 
     @staticmethod
     def _group_counts(frame: FrameResult) -> Iterator[tuple[Quantity, float]]:

@@ -125,6 +125,7 @@ def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None
         "gauge_rows": [(_of_laser(report, row), gauge_table.cells(row)) for row in report.measures],
         "gauge_definitions": gauge_table.definitions(list(report.measures)),
         "gauge_note": report.measures_note,
+        "gauge_steps": gauge_table.over_steps(list(report.measures)),
         "gauge_reasons": gauge_table.reasons(list(report.measures)),
         "calibrations": calibrations,
         "calibration_columns": calibration.COLUMNS,

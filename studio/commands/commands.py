@@ -295,7 +295,7 @@ def _print_results(result: dict[str, Any]) -> None:
 
         found = [(row["name"], *gauge_table.plain_cells(row)) for row in result["measures"]]
         print_table("Measures", found, header=("Measure", *gauge_table.COLUMNS))
-        for text in gauge_table.reasons(result["measures"]):
+        for text in (*gauge_table.over_steps(result["measures"]), *gauge_table.reasons(result["measures"])):
             print(text)
         if result.get("measures_note"):
             print(result["measures_note"])

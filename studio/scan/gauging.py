@@ -18,6 +18,7 @@ from analysis.gauges.gauge import Gauge
 from analysis.gauges.of_scan import Patch, patch
 from analysis.gauges.profile import Profile, measured_profile, true_profile
 from analysis.gauges.read import Reading, read
+from analysis.gauges.steps import over_steps
 from analysis.gauges.true_end import true_section
 from render.base.errors import InputError
 from render.base.files import atomic_write, read_bytes
@@ -25,6 +26,7 @@ from render.base.pose import invert
 from render.frame import Frame
 from studio.project.found_motion import measured_pose
 from studio.project.project import ProfileSection, Project
+from studio.scan.ground import ground
 from studio.scan.own_files import MEASURE_COLUMNS
 from studio.scan.sheet_lean import T_section_camera, section_of
 from studio.scan.stages import Measurement
@@ -44,7 +46,7 @@ def profiles(project: Project, frame: Frame, found: Measurement, section: Profil
     T_camera_world, curve = invert(project.scene.T_world_camera(frame.step)), frame.curves[found.laser]
     T_laser_world = invert(project.scene.T_camera_laser(found.laser)) @ T_camera_world
     part = true_section(curve, T @ T_camera_world, T_laser_world, project.scene.lasers[found.laser].tan_half_fan)
-    return measured, true_profile(curve, T, measured, part)
+    return measured, true_profile(curve, T, measured, part, ground(project.scene))
 
 
 def readings(project: Project, frame: Frame, found: Sequence[Measurement]) -> tuple[Reading, ...]:
@@ -80,7 +82,7 @@ def read_each(gauges: Sequence[Gauge], step: int, of: Mapping[int, tuple[Profile
             found.append(Reading(gauge, step, reason=f"laser {gauge.laser} was not rendered"))
         else:
             found.append(read(gauge, step, *of[gauge.laser]))
-    return tuple(found)
+    return tuple(over_steps(found))
 
 
 def kept_readings(gauges: Sequence[Gauge], scanned: Sequence[Gauge], rows: object) -> dict[Gauge, Reading]:
@@ -132,18 +134,31 @@ def worst(found: Sequence[Reading]) -> Reading:
 def measures_record(gauges: Sequence[Gauge], found: Sequence[Reading]) -> list[dict[str, Any]]:
     """One entry for each measure: its worst reading with a value, and how many came to which verdict; SI units.
 
-    The verdict is that of all readings: one that was not measured leaves it undecided, where none fails.
+    The verdict is that of all readings: one that was not measured, as of `over_steps`, leaves it undecided, where none
+    fails. Of several with a value `over_steps` holds what they come to.
     """
     rows = []
     for gauge in gauges:
-        own = [one for one in found if one.gauge == gauge]
+        own = over_steps([one for one in found if one.gauge == gauge])
         shown = worst(own) if own else Reading(gauge, gauge.step, reason="no frame of its step was measured")
-        missing = [one.reason for one in own if one.reason]
+        missing = [one for one in own if one.reason]
         row = _row(shown) | {"readings": len(own), "verdicts": verdict_counts(gauge, own)}
         if missing and row["verdict"] == "pass":
             row["verdict"] = "undecided"
-        rows.append({**row, "first_reason": missing[0] if missing else ""})
+        reason, step = (missing[0].reason, missing[0].step) if missing else ("", None)
+        rows.append({**row, "first_reason": reason, "first_missing": step, "over_steps": _over_steps(own)})
     return rows
+
+
+def _over_steps(found: Sequence[Reading]) -> dict[str, float | int | None] | None:
+    """Number, median, least and largest of the values, and the median of their sigmas; None: there is one at most."""
+    some = [(one.value, one.sigma) for one in found if not one.reason and math.isfinite(one.value)]
+    if len(some) < 2:
+        return None
+    values, sigmas = (np.array(one) for one in zip(*some, strict=True))
+    names = {"median": np.median(values), "least": values.min(), "largest": values.max()}
+    sigma = float(np.nanmedian(sigmas)) if np.isfinite(sigmas).any() else None
+    return {"measured": len(some), **{name: float(value) for name, value in names.items()}, "sigma": sigma}
 
 
 def judged_over_steps(gauge: Gauge, found: Sequence[Reading]) -> dict[str, Any]:

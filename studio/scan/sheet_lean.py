@@ -75,14 +75,16 @@ def section_normal(T_world_laser: Float, section: ProfileSection) -> Float:
 
 
 def section_of(scene: Scene, laser: int, step: int, section: ProfileSection) -> Section:
-    """Its name, and the others that the list has, as seen from its frame."""
+    """Its name, and the others that the list has and that show the line's points apart, as seen from its frame."""
     T_world_camera = scene.T_world_camera(step)
     T_world_laser = T_world_camera @ scene.T_camera_laser(laser)
     turned = T_section_camera(scene, laser, step, section)[:3, :3] @ T_world_camera[:3, :3].T
+    own = T_world_laser[:3, 0]
+    normals = {name: own if name == "laser_plane" else section_normal(T_world_laser, name) for name in SECTIONS}
     others = tuple(
-        (title, turned @ (T_world_laser[:3, 0] if name == "laser_plane" else section_normal(T_world_laser, name)))
-        for name, title in SECTIONS.items()
-        if name != section
+        (SECTIONS[name], turned @ normal)
+        for name, normal in normals.items()
+        if name != section and float(normal @ own) > math.cos(NEARLY_LEVEL)
     )
     return Section(in_words(section), others)
 

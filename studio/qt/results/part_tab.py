@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, marked_verdict, value_text
+from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, marked_verdict
 from analysis.report.units import NONE
 from studio.project.same_lasers import same_lasers
 from studio.qt.core import theme
@@ -31,6 +31,7 @@ from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import keep_room, text_button
+from studio.qt.results.measure_tip import first_upper, measure_tip
 from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.part_drawing import PartDrawing
 from studio.qt.results.part_editor import PartEditor
@@ -309,21 +310,14 @@ class PartTab(QWidget):
         lasers, laser = self.session.project.scene.lasers, self._measures[row].laser
         of_laser = f" ({lasers[laser].name})" if len(lasers) > 1 and laser < len(lasers) else ""
         texts = [gauge.name + of_laser, NONE, NONE, NONE, NONE]
-        tip = f"<p>{TITLES[gauge.kind]}</p>{DEFINITIONS.get(gauge.kind, '')}"
+        of = "" if entry is None or entry["readings"] > 1 else self._steps.of_which(gauge)
         if entry is not None:
-            _, value, sigma, _, _, whole_verdict, error, ratio = cells(entry)
-            of = "" if entry["readings"] > 1 else self._steps.of_which(gauge)
+            _, value, sigma, _, _, _, error, _ = cells(entry)
             # counts have no room beside a name: the tip has them
             verdict = "not measured" if entry["reason"] else marked_verdict(entry)
             verdict = f"{verdict}{of}" if verdict != NONE or not of else of.removeprefix(", ")
             texts[1:] = [value_of_worst(entry, value), sigma, error, verdict]
-            truth = value_text(entry["truth"], entry["sigma"], gauge.unit)
-            in_sigmas = "" if ratio == NONE else f" ({ratio} sigma)"
-            tip += f"<p>{whole_verdict}{of}</p>" + (
-                f"<p>{_sentence(entry['reason'])}</p>"
-                if entry["reason"]
-                else f"<p>truth {truth}; {entry['points']} points{in_sigmas}</p><p>{_sentence(entry['remark'])}</p>"
-            )
+        tip = measure_tip(gauge, entry, of)
         for column, text in enumerate(texts):
             item = self.table.show_cell(row, column, text)
             item.setToolTip(tip)
@@ -342,11 +336,11 @@ class PartTab(QWidget):
             count = f" ({len(self._placed) + 1} of {len(names)})" if len(names) > 1 else ""
             text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
         elif entry is not None and (reason := entry["reason"] or entry["first_reason"]):
-            text = _sentence(reason)
+            text = first_upper(reason)
         elif gauge is not None and (odd := beside_nominal(gauge, None if entry is None else entry["value"])):
             text = odd
         elif entry is not None and entry["remark"]:
-            text = _sentence(f"{entry['remark']}.")
+            text = first_upper(f"{entry['remark']}.")
         elif self.readings and (render := self.session.shown) is not None:
             text = lean_text(render.project.scene, self.laser, render.frame.step, self.session.project.measured_in)
         if self._read and self.placing is None:
@@ -393,8 +387,3 @@ class PartTab(QWidget):
 def _free_name(kind: Kind, taken: tuple[Gauge, ...]) -> str:
     names, short = {gauge.name for gauge in taken}, TITLES[kind].split(" (")[0]
     return next(name for i in range(1, MOST_GAUGES + 2) if (name := f"{short} {i}") not in names)
-
-
-def _sentence(text: str) -> str:
-    """With a capital letter."""
-    return text[:1].upper() + text[1:]

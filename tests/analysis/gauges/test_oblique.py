@@ -129,3 +129,13 @@ def test_a_section_along_the_faces_is_said_to_show_nothing_of_them() -> None:
     along = replace(square, normal=square.normal @ quarter.T, place=square.place @ quarter.T)
     found = read(gauge("opening"), 0, along, None)
     assert "runs along its faces" in found.remark and math.isnan(found.square)
+
+
+def test_where_the_exact_line_is_not_no_section_is_advised() -> None:
+    """Stray points beside an end face had its normal, and so the advice to run the section along the profile."""
+    asked = gauge("opening", **LIMITS)
+    measured = through(shape("opening")[0], math.radians(13.0))
+    truth = replace(measured, normal=None, place=None)
+    assert "obliquely" in read(asked, 0, measured, truth).remark
+    away = read(asked, 0, measured, truth.taken(np.abs(ACROSS) > 0.018))
+    assert away.stray and "list of sections" not in away.remark and math.isnan(away.oblique)

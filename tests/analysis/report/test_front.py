@@ -96,6 +96,27 @@ def test_the_worst_measure_decides() -> None:
         assert found["decided_by"].count("Height") == len(deciding)
 
 
+def test_what_is_not_decided_says_how_many_steps_are() -> None:
+    """ "Not decided: Step height." hid that all steps of the part pass, and that the others were not measured."""
+    steps = {**gauge("undecided"), "name": "Step", "readings": 20, "verdicts": {"none": 5, "pass": 14, "undecided": 1}}
+    alike = {**gauge("undecided"), "name": "V", "readings": 20, "verdicts": {"undecided": 20}}
+    found = told(replace(handed(customer="Ada"), measures=(steps, alike)))
+    assert found["decided_by"] == "Not decided: Step (14 pass, 1 undecided, 5 not measured), V."
+
+
+def test_the_steps_of_a_measure_are_told_beside_its_worst_one() -> None:
+    """One step of twenty was printed, and nothing of the nineteen others."""
+    over = {"measured": 14, "median": 0.012004, "least": 0.01198, "largest": 0.01206, "sigma": 2e-5}
+    row = {**gauge("pass"), "readings": 20, "verdicts": {"pass": 14, "none": 6}, "over_steps": over}
+    for report in (make_report(), handed(customer="Ada")):
+        page = render_page(replace(report, measures=(row,)))
+        told_of = (
+            "Height: median 12.004\u00a0mm, from 11.980 to 12.060\u00a0mm, over the 14 of 20 steps that were measured."
+        )
+        assert page.count(told_of) == 1
+        assert "over the" not in render_page(replace(report, measures=(gauge("pass"),)))
+
+
 def test_a_tolerance_has_its_limits_in_order_and_one_alone_is_one() -> None:
     with pytest.raises(ValidationError, match="lower is 1 mm and upper -1 mm"):
         Delivery(lower=1e-3, upper=-1e-3)

@@ -8,16 +8,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import main
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.read import MISFITS, OTHER_SHAPE, Reading
-from analysis.report.gauge_table import cells, reasons, worst_of
+from analysis.report.gauge_table import cells, over_steps, reasons, worst_of
 from analysis.report.units import NONE
 from render.base.errors import InputError
 from render.run import Run
+from render.scene.motion import LinearStage
 from render.world.world import build_world
 from studio.project.project import Project
 from studio.scan.gauging import (
@@ -32,8 +34,11 @@ from studio.scan.gauging import (
     write_measures,
 )
 from studio.scan.line_extraction import extract_line
+from studio.scan.options import ScanOptions
+from studio.scan.scan import run_scan
 from studio.scan.scan_folder import measured_project, open_folder
 from studio.scan.stages import Clock, Measurement, compare_points, develop_step, render_step, triangulate_line
+from tests.studio.scan_of_steps import small_project as scan_of_steps
 from tests.studio.small_scan import scan, small_project
 
 FLAT = {"kind": "straightness", "regions": [[-0.08, 0.08]]}
@@ -93,6 +98,11 @@ def test_a_profile_knows_how_strong_its_line_is_and_the_exact_one_is_of_the_midd
     measured, exact = profiles(project, frame, Measurement(0, 0, image, line, points, errors), "laser_plane")
     assert measured.strength is not None and exact.strength is None
     assert measured.strength == pytest.approx(line.amplitude[measured.index, 0]) and len(measured.index) > 20
+    # of a point that no exact line is beside, the nearest face is any
+    assert measured.normal is not None and np.isfinite(measured.normal[1:-1]).all()
+    alone = replace(errors, truth=np.where(np.arange(len(errors.truth)) % 2, errors.truth, -1))
+    measured, _ = profiles(project, frame, Measurement(0, 0, image, line, points, alone), "laser_plane")
+    assert measured.normal is not None and np.isnan(measured.normal).any(axis=1).mean() == pytest.approx(0.5, abs=0.1)
 
 
 def table(folder: Path) -> list[dict[str, str]]:
@@ -196,6 +206,47 @@ def test_a_step_that_was_not_measured_neither_hides_the_others_nor_passes() -> N
         assert (cells(row)[1] == NONE) == (verdict is None)
         missing = [one for one in found if one.reason]
         assert any("not measured" in one and "too few points" in one for one in reasons([row])) == bool(missing)
+
+
+def test_a_stray_step_is_not_the_worst_and_what_the_others_come_to_is_told() -> None:
+    """-10.86 mm of stray light was the value of a step of 12 mm that fourteen steps passed, printed as its failure."""
+    gauge = Gauge.model_validate({"name": "a", **LEVEL, "nominal": 0.012, "lower": -5e-4, "upper": 5e-4})
+    good = [Reading(gauge, k, value=0.012 + 1e-6 * k, sigma_random=2e-6, sigma_systematic=0.0) for k in range(14)]
+    stray = Reading(gauge, 14, value=-0.01086, sigma_random=5.9e-4, sigma_systematic=0.0, stray=True)
+    (row,) = measures_record((gauge,), [*good, stray, Reading(gauge, 15, reason="too few points")])
+    assert row["step"] == 13 and row["verdict"] == "undecided" and row["verdicts"] == {"none": 2, "pass": 14}
+    assert cells(row)[5] == "?\u00a0undecided: 14 pass, 2 not measured, worst measured: step 14 of 16"
+    told = "a: median 12.0065\u00a0mm, from 12.0000 to 12.0130\u00a0mm, over the 14 of 16 steps that were measured"
+    assert over_steps([row]) == [told]
+    (missing,) = reasons([row])
+    assert missing.startswith("a is not measured in 2 of 16 steps, first in step 15: the exact line does not reach")
+    assert "-10.8600 mm" in missing
+    for alone in (good[:1], [stray], []):
+        assert over_steps([measures_record((gauge,), alone)[0]]) == []
+    assert over_steps([{**row, "over_steps": None}]) == [], "of a former version"
+    alone = judged_over_steps(gauge, [stray])
+    assert alone["reason"] and alone["value"] is None, "a step that is looked at is judged alike"
+
+
+def test_a_scan_that_goes_on_over_the_table_is_judged_by_the_steps_of_its_part(tmp_path: Path) -> None:
+    """Of 20 steps the last four saw the table alone, and were four failures of 0.0 mm."""
+    rise = {"name": "rise", "kind": "step", "regions": [[-0.04, -0.018], [-0.01, 0.012]], "nominal": -0.0103}
+    flat = {"name": "flat", "kind": "flatness", "regions": [[-0.013, 0.013]]}
+    project = with_measures(scan_of_steps(), {**rise, "lower": -1.2e-2, "upper": 1.2e-2}, flat)
+    scene = project.scene.model_copy(update={"motion": LinearStage(step=(0.0075, 0.0, 0.0), steps=16)})
+    project = project.model_copy(update={"scene": scene}).save(tmp_path / "table.json")
+    run_scan(project, tmp_path, out=tmp_path / "out", options=ScanOptions(report=False))
+    rows = [row for row in table(tmp_path / "out") if row["name"] == "rise"]
+    beyond = [row for row in rows if "on the plane that parts stand on" in row["reason"]]
+    assert len(beyond) >= 8 and beyond == rows[-len(beyond) :] and not any(row["value"] for row in beyond)
+    of_part = [row for row in rows if row["value"]]
+    assert len(of_part) >= 6 and {row["verdict"] for row in of_part} == {"pass"}
+    record, of_flat = open_folder(tmp_path / "out").manifest["measures"]
+    assert record["verdict"] == "undecided" and record["over_steps"]["measured"] == len(of_part)
+    assert record["verdicts"] == {"none": 16 - len(of_part), "pass": len(of_part)}
+    # most of the steps are of the table, which is not what is asked for
+    assert of_flat["truth"] == pytest.approx(0.0, abs=1e-6) and of_flat["value"] < 4.0 * of_flat["sigma"]
+    assert f"in {len(beyond)} of the steps its region lies on the plane that parts stand on" in of_flat["remark"]
 
 
 def test_the_table_of_a_scan_is_judged_by_another_tolerance(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from render.frame import LaserCurve
 from render.laser.laser import LineLaser
 from render.scene.scene import Rig, Scene
 from studio.project.project import ProfileSection
-from studio.scan.sheet_lean import T_section_camera, lean_text, sheet_lean
+from studio.scan.sheet_lean import T_section_camera, lean_text, section_of, sheet_lean
 from tests.render.scenes import paper_camera
 
 RADIUS, STEP = 0.15, 0.02
@@ -110,3 +110,15 @@ def test_a_level_sheet_is_read_in_its_own_plane() -> None:
     own = T_section_camera(scene, 0, 0, "laser_plane")
     np.testing.assert_allclose(T_section_camera(scene, 0, 0, "upright"), own, atol=1e-9)
     assert "nearly level" in lean_text(scene, 0, 0, "upright")
+
+
+@pytest.mark.parametrize(("lean", "missing"), [(13.0, {"Y"}), (0.0, {"Y", "Z"}), (75.0, {"Y"})])
+def test_a_section_in_which_the_line_is_a_stroke_is_none_that_may_be_chosen(lean: float, missing: set[str]) -> None:
+    """Across Y was advised to a part that is not the same along Y, and whose profile runs along it."""
+    scene = looking_down(lean)
+    told = section_of(scene, 0, 0, "laser_plane").others
+    across = {title[-1] for title, _ in told if "across" in title}
+    assert across == {"X", "Y", "Z"} - missing
+    for _, normal in told:
+        assert abs(float(normal[0])) > math.cos(math.radians(80.0)), "points keep their order across the fan"
+    assert "In the laser's plane" in dict(section_of(scene, 0, 0, "across_x").others)

@@ -10,7 +10,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from analysis.gauges.gauge import Gauge
-from analysis.report.gauge_table import cells
+from analysis.report.gauge_table import cells, over_steps_of
 from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.scan_steps import scan_steps
@@ -85,6 +85,36 @@ def test_a_verdict_is_over_all_steps_or_names_its_step(panel: ResultsPanel) -> N
     assert verdict(panel).endswith(f"{gauge.verdict(steps[0].value, steps[0].sigma)}, step 1")
     assert part.told.text().startswith("Of step 1 of 3. All steps, as measured last")
     assert "(step" not in part.table.item(0, 1).text()
+
+
+def test_a_row_of_all_steps_tells_what_they_come_to_and_that_of_one_does_not(panel: ResultsPanel) -> None:
+    """The worst step alone was told, and nothing of the others."""
+    table = panel.part.table
+    assert panel.session.shown is not None and panel.session.shown.scan is not None
+    steps = step_readings(panel.session.shown.scan.found.folder / "measures.csv", (LEVEL,))[LEVEL]
+    (row,) = measures_record((LEVEL,), steps)
+    told = over_steps_of(row)
+    assert told.startswith("median ") and told.endswith("over the 3 steps")
+    assert f"<p>M{told[1:]}</p>" in table.item(0, 0).toolTip() and "edian" not in table.item(1, 0).toolTip()
+    panel.scan_bar.scope.setCurrentIndex(1)
+    assert "edian" not in table.item(0, 0).toolTip()
+
+
+def test_a_step_that_is_looked_at_has_no_value_of_stray_points_and_draws_none(
+    panel: ResultsPanel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Window, chart and 3D view had a value and a verdict of points where the exact line is not."""
+    part = panel.part
+    panel.scan_bar.scope.setCurrentIndex(1)
+    part.table.selectRow(0)
+    assert len(panel.session.measures_in_3d) == len(part.drawing.texts) == 1
+    monkeypatch.setattr("analysis.gauges.read.is_stray", lambda *_: True)
+    part.refresh()
+    assert verdict(panel) == "not measured, step 1" and part.readings[0].reason.startswith(
+        "the exact line does not reach"
+    )
+    assert len(panel.session.measures_in_3d) == len(part.drawing.texts) == 0
+    assert part.told.text().startswith("Of step 1 of 3") and "stray light or noise" in part.told.text()
 
 
 def test_what_is_drawn_of_one_step_beside_figures_of_all_names_it(panel: ResultsPanel) -> None:
