@@ -6,6 +6,9 @@ place between them is as likely as another: it is taken midway, and is uniform o
 A pixel sees a strip as high as this distance, so that a scan line beyond the edge may have a weaker line of the
 surface: the last strip that is at least half as strong as the others has its middle on it. Where another surface in the
 strip is the stronger one, that is seen in place of it, up to a share of the strip that puts the edge farther out.
+
+Stray points beyond a part jump the farthest, and would be taken for what ends: where no surface is found at the largest
+jump, it is looked for without the points that make none.
 """
 
 from __future__ import annotations
@@ -43,6 +46,12 @@ NO_JUMP = (
 TWO_EDGES = "two edges in the region {!r}: the surface goes on behind a hole in its points; drag it over one of them"
 BELOW_AN_EDGE = "no edge in the region {!r}: the surface that ends there is higher and beside it; widen it over that"
 FEW_POINTS = "too few points on the surface that ends in the region {!r}: {}; at least {} are needed"
+STRAY_IN_IT = (
+    "{}; {} stray points in it, off every surface, are a likely cause: drag it over more of the surface, fewer of them"
+)
+PASSED_OVER = "{} of the {} points in the region {!r} are stray ones, off every surface, and are passed over"
+MANY = 0.1
+"""Of a region's points, from which on it is told that so many are passed over."""
 POINTS_END = (
     "all points end at the edge in the region {!r}: where it is the image or the laser's fan that ends, and not the "
     "part, this is no edge"
@@ -76,7 +85,28 @@ def edge_of(profile: Profile, part: Float, region: tuple[float, float], name: st
 
     Of the two surfaces there the higher one ends, that is the one nearer to the laser.
     """
-    order = _with_neighbours(profile, part)
+    found = _at_the_jump(profile, part, region, name)
+    stray = _stray(profile, part) if found.why else np.zeros(len(part), dtype=np.bool_)
+    passed = np.flatnonzero(stray & (part > 0.0))
+    if not stray.any():
+        return found
+    without = _at_the_jump(profile, np.where(stray, 0.0, part), region, name, stray)
+    if not without.why and any(_goes_on(without, profile, int(one)) for one in passed):
+        return _nothing(profile, TWO_EDGES.format(name))
+    if without.why:
+        return _nothing(profile, STRAY_IN_IT.format(found.why, len(passed))) if len(passed) else found
+    there = np.count_nonzero(part)
+    told = PASSED_OVER.format(len(passed), there, name) if len(passed) > MANY * there else ""
+    return replace(without, remark="; ".join(one for one in (without.remark, told) if one))
+
+
+def _at_the_jump(
+    profile: Profile, part: Float, region: tuple[float, float], name: str, stray: NDArray[np.bool_] | None = None
+) -> Edge:
+    """The edge, as if the stray points (m,) were not there."""
+    order = _with_neighbours(profile, part, stray)
+    if len(order) < FEWEST:
+        return _nothing(profile, FEW_POINTS.format(name, np.count_nonzero(part), FEWEST))
     jump, distance = _jumps(profile, order)
     inside = part[order] > 0.0
     here = jump & (inside[1:] | inside[:-1])
@@ -91,6 +121,27 @@ def edge_of(profile: Profile, part: Float, region: tuple[float, float], name: st
     if not found.why and (why := _not_the_end(found, profile, part, int(beyond), name)):
         return _nothing(profile, why)
     return found
+
+
+def _stray(profile: Profile, part: Float) -> NDArray[np.bool_]:
+    """(m,) the points in runs without a jump, of the whole profile, that are too short for a surface."""
+    order = _one_a_line(profile, part)
+    inside = order[part[order] > 0.0]
+    distance = np.linalg.norm(np.diff(profile.position[order], axis=0), axis=1)
+    # among many stray points of a region the usual distance is theirs
+    jump = distance > min(_usual(profile, order), _usual(profile, inside))
+    run = np.append(0, np.cumsum(jump))
+    stray = np.zeros(len(part), dtype=np.bool_)
+    stray[order] = np.bincount(run)[run] < FEWEST
+    return stray
+
+
+def _goes_on(edge: Edge, profile: Profile, point: int) -> bool:
+    """Whether a point beyond the edge lies on the surface that ends there."""
+    along, across = edge.frame.local(profile.position[point])
+    middle = float(np.median(edge.frame.local(profile.position[edge.here])[:, 0]))
+    beyond = (along - edge.theta[2]) * (edge.theta[2] - middle) > 0.0
+    return bool(beyond and abs(across - edge.theta[0] - edge.theta[1] * along) <= _on_it(edge, profile, along))
 
 
 def between_edges(edges: Sequence[Edge], theta: Sequence[Float]) -> float:
@@ -122,13 +173,20 @@ def _mean_direction(theta: Sequence[Float], edges: Sequence[Edge]) -> Float:
     return np.asarray(mean / np.linalg.norm(mean))
 
 
-def _with_neighbours(profile: Profile, part: Float) -> Places:
-    """The points of a region and the next one on either side, in the order of their scan lines, without false ones; of
-    several on a scan line the highest."""
+def _one_a_line(profile: Profile, part: Float) -> Places:
+    """The points in the order of their scan lines; of several on one the highest, of those in the region if any is."""
     order = np.lexsort((profile.position[:, 1], part > 0.0, profile.index))
     row = profile.index[order]
-    order = order[np.append(row[1:] != row[:-1], True)]
+    return np.asarray(order[np.append(row[1:] != row[:-1], True)])
+
+
+def _with_neighbours(profile: Profile, part: Float, stray: NDArray[np.bool_] | None) -> Places:
+    """The points of a region and the next one on either side, in the order of their scan lines, without false ones."""
+    order = _one_a_line(profile, part)
+    order = order if stray is None else order[~stray[order]]
     inside = np.flatnonzero(part[order] > 0.0)
+    if not len(inside):
+        return order[:0]
     order = order[max(inside[0] - 1, 0) : inside[-1] + 2]
     for length in range(1, LONGEST_ALONE + 1):
         order = order[~_alone(profile, order, length)]
@@ -265,14 +323,19 @@ def _reach(line: Fit, profile: Profile, surface: Places, pitch: float) -> float:
     return max(pitch, OUTLIER_SIGMAS * line.ratio * _sigma(profile, surface))
 
 
+def _on_it(edge: Edge, profile: Profile, along: float) -> float:
+    """m, from the line of a surface, within which a point beyond its edge, so far along the frame, may be on it."""
+    unsure = float(edge.sigma[0] + edge.sigma[1] * abs(along))
+    return _reach(edge, profile, np.flatnonzero(edge.here), edge.pitch) + OUTLIER_SIGMAS * edge.ratio * unsure
+
+
 def _not_the_end(edge: Edge, profile: Profile, part: Float, beyond: int, name: str) -> str:
     """Why the surface does not end at an edge, judged by the point beyond it; empty: it does.
 
     Scan lines without points before a higher surface are an opening, and without them a wall stands on this one.
     """
     along, across = edge.frame.local(profile.position[beyond])
-    unsure = float(edge.sigma[0] + edge.sigma[1] * abs(along))
-    reach = _reach(edge, profile, np.flatnonzero(edge.here), edge.pitch) + OUTLIER_SIGMAS * edge.ratio * unsure
+    reach = _on_it(edge, profile, along)
     above = float(across - edge.theta[0] - edge.theta[1] * along)
     if part[beyond] > 0.0:
         return TWO_EDGES.format(name) if abs(above) <= reach else ""

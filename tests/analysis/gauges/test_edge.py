@@ -86,6 +86,34 @@ def test_false_points_that_stand_alone_are_no_edges() -> None:
     assert read_slot(profile(height)).value == pytest.approx(EXACT, rel=1e-7)
 
 
+def beside_stray(seed: int, most: int = 6) -> Profile:
+    """A top of slope 0.1 and 10 mm, and beyond either end so many points anywhere along their lines of sight."""
+    random, count = np.random.default_rng(seed), len(ACROSS)
+    far = np.flatnonzero(np.abs(ACROSS) > 0.0052)
+    left, right = far[ACROSS[far] < 0.0], far[ACROSS[far] > 0.0]
+    stray = np.concatenate([random.choice(one[np.abs(ACROSS[one]) < 0.009], most, False) for one in (left, right)])
+    height = -0.5 + 0.1 * ACROSS
+    height[stray] += random.choice([-1.0, 1.0], 2 * most) * random.uniform(0.003, 0.1, 2 * most)
+    return profile(height, noise=noises(1, 1.0, seed)[0]).taken(between(-0.005, 0.005) | np.isin(range(count), stray))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_stray_points_beyond_a_part_are_not_what_ends_there(seed: int) -> None:
+    found = read_slot(beside_stray(seed))
+    assert found.value == pytest.approx(EXACT, abs=5e-5), found.reason
+
+
+def test_many_stray_points_that_are_passed_over_are_told_and_few_are_not() -> None:
+    told = [read_slot(beside_stray(seed)).remark for seed in range(40)]
+    assert any("6 of the 26 points in the region 'first edge' are stray ones" in one for one in told)
+    assert not any("stray" in read_slot(beside_stray(seed, 2)).remark for seed in range(40))
+
+
+def test_where_stray_points_leave_no_surface_they_are_named_as_the_cause() -> None:
+    found = read_slot(beside_stray(3), (-0.009, -0.0047), SLOT.regions[1])
+    assert np.isnan(found.value) and "stray points in it, off every surface, are a likely cause" in found.reason
+
+
 @pytest.mark.parametrize(
     ("height", "regions", "told"),
     [
