@@ -14,7 +14,6 @@ jump, it is looked for without the points that make none.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,7 +75,12 @@ class Edge(Fit):
     @property
     def place(self) -> Float:
         """(2,) of the edge, in the profile's coordinates, m."""
-        return _place(self, self.theta)
+        return self.place_of(self.theta)
+
+    def place_of(self, theta: Float) -> Float:
+        """(2,) with other parameters (3,)."""
+        constant, slope, end = theta
+        return self.frame.out(np.array([end, constant + slope * end]))
 
 
 def edge_of(profile: Profile, part: Float, region: tuple[float, float], name: str) -> Edge:
@@ -142,35 +146,6 @@ def _goes_on(edge: Edge, profile: Profile, point: int) -> bool:
     middle = float(np.median(edge.frame.local(profile.position[edge.here])[:, 0]))
     beyond = (along - edge.theta[2]) * (edge.theta[2] - middle) > 0.0
     return bool(beyond and abs(across - edge.theta[0] - edge.theta[1] * along) <= _on_it(edge, profile, along))
-
-
-def between_edges(edges: Sequence[Edge], theta: Sequence[Float]) -> float:
-    """m, from edge to edge along the two surfaces that end there, or along the mean of their directions."""
-    apart = _place(edges[1], theta[1]) - _place(edges[0], theta[0])
-    return abs(float(apart @ _mean_direction(theta, edges)))
-
-
-def dimension(edges: Sequence[Edge]) -> Float:
-    """(2, 2): the ends of what is measured, from the first edge along the surfaces."""
-    along = _mean_direction([one.theta for one in edges], edges)
-    first, second = (one.place for one in edges)
-    return np.stack([first, first + along * float((second - first) @ along)])
-
-
-def sampling_sigma(edges: Sequence[Edge]) -> float:
-    """m, of the distance between edges that may be anywhere between their scan lines, if these are known."""
-    return math.hypot(*(one.pitch * math.hypot(1.0 / math.sqrt(12.0), one.unevenness) for one in edges))
-
-
-def _place(edge: Edge, theta: Float) -> Float:
-    constant, slope, end = theta
-    return edge.frame.out(np.array([end, constant + slope * end]))
-
-
-def _mean_direction(theta: Sequence[Float], edges: Sequence[Edge]) -> Float:
-    both = [np.array([1.0, one[1]]) @ edge.frame.axes for one, edge in zip(theta, edges, strict=True)]
-    mean = sum((along / np.linalg.norm(along) for along in both), np.zeros(2))
-    return np.asarray(mean / np.linalg.norm(mean))
 
 
 def _one_a_line(profile: Profile, part: Float) -> Places:

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.gauges.area import section, section_points, without_unsure
-from analysis.gauges.edge import Edge, dimension
+from analysis.gauges.between_edges import dimension, extension
+from analysis.gauges.edge import Edge
 from analysis.gauges.fit import Fit
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.parts import parts_of
@@ -49,7 +50,10 @@ def outline(gauge: Gauge, profile: Profile) -> tuple[list[Float], Float]:
             return _area(fits[0], gauge.regions[1], profile)
     curves = [_polynomial(one, *_span(one, profile, one.here)) for one in fits]
     edges = [one for one in fits if isinstance(one, Edge)]
-    return curves, dimension(edges) if edges else _between_lines(gauge, fits)
+    if not edges:
+        return curves, _between_lines(gauge, fits)
+    beside = extension(edges)
+    return [*curves, *([beside] if len(beside) else [])], dimension(edges)
 
 
 def _span(one: Fit, profile: Profile, here: NDArray[np.bool_]) -> tuple[float, float]:

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.gauges.area import area_above, section, unseen, without_unsure
-from analysis.gauges.edge import NOT_IN_TRUTH, Edge, between_edges, edge_of, sampling_sigma
+from analysis.gauges.between_edges import along_what, between_edges, sampling_sigma
+from analysis.gauges.edge import NOT_IN_TRUTH, Edge, edge_of
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, Gauge, Verdict
 from analysis.gauges.oblique import (
@@ -133,8 +134,9 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
     if not remark and ratio > MISFIT:
         remark = MISFITS.get(gauge.kind, OTHER_SHAPE).format(ratio)
     remark = remark or _swapped(gauge) or _left_out(gauge, measured, fits)
-    if gauge.kind == "point_to_point" and value < math.sqrt(2.0) * _between_middles(gauge):
-        remark = f"{remark}; {AS_DRAGGED}" if remark else AS_DRAGGED
+    as_dragged = gauge.kind == "point_to_point" and value < math.sqrt(2.0) * _between_middles(gauge)
+    told = AS_DRAGGED if as_dragged else along_what(edges) if edges and not stray else ""
+    remark = "; ".join(one for one in (remark, told) if one)
     one = Reading(gauge, step, value, random, systematic, int(used), true, "", remark, stray=stray)
     ground = () if truth is None else on_ground(gauge, truth)
     one = one if stray else _beside_square(one, measured)

@@ -80,6 +80,30 @@ def test_surfaces_of_unlike_heights_are_apart_along_themselves() -> None:
     assert drawn == pytest.approx(np.array([[-0.005, -0.5], [0.005, -0.5]]), abs=1e-9)
 
 
+def test_of_edges_that_are_not_level_it_is_told_and_drawn_along_what_they_are_apart() -> None:
+    """A level top and, 8 mm lower, a side that falls by 0.5: along the mean direction of both."""
+    height = np.where(ACROSS > 0.0, FLAT - 0.008 - 0.5 * (ACROSS - 0.005), FLAT) - 0.02 * (np.abs(ACROSS) < 0.005)
+    points = profile(height)
+    found, (curves, drawn) = read_slot(points), outline(SLOT, points)
+    half = 0.5 * np.arctan(0.5)
+    along, across = np.array([np.cos(half), -np.sin(half)]), np.array([np.sin(half), np.cos(half)])
+    assert found.value == pytest.approx(np.array([0.01, -0.008]) @ along, abs=2e-5)
+    assert curves[-1][0] == pytest.approx(drawn[1], abs=1e-12)
+    assert curves[-1][1] == pytest.approx([0.005, -0.508], abs=5e-5)
+    assert np.diff(curves[-1], axis=0)[0] @ np.diff(drawn, axis=0)[0] == pytest.approx(0.0, abs=1e-12)
+    lower = -np.array([0.01, -0.008]) @ across
+    assert "the mean direction of the two surfaces, which are at 26.57°" in found.remark
+    assert "at -13.28° in the profile" in found.remark and "mm below the first" in found.remark
+    assert float(found.remark.split(" lies ")[1].split()[0]) == pytest.approx(1e3 * lower, abs=1e-3)
+
+
+def test_edges_that_are_level_within_their_sigma_are_not_told_to_be_apart() -> None:
+    random = np.random.default_rng(41)
+    for noise in noises(60, 1.0, seed=42):
+        points = profile(slot(random.uniform(-0.006, -0.004), random.uniform(0.004, 0.006)), noise=noise)
+        assert read_slot(points).remark == "" and len(outline(SLOT, points)[0]) == 2
+
+
 def test_false_points_that_stand_alone_are_no_edges() -> None:
     height = slot(-0.005, 0.005)
     height[[60, 61, 70, 130]] += np.array([0.3, 0.3, -0.2, 0.4])
