@@ -15,7 +15,6 @@ from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.camera.camera import Camera
 from render.laser.laser import LineLaser
-from render.material.material import reflectance_weights
 from render.scene.lights import PointLight
 from render.sensor.response import band_response, joules_per_radiance, laser_response
 from render.sensor.sensor import Sensor
@@ -74,9 +73,8 @@ def line_width_px(
 
 def line_electrons(camera: Camera, laser: LineLaser, sensor: Sensor, lit: Lit, pixels: Float) -> Float:
     """(n,) electrons that a pixel would have in which the whole pixel were as bright as the line's centre."""
-    albedo = lit.albedo @ np.array(reflectance_weights(laser.wavelength_nm))
     response = joules_per_radiance(camera, sensor) * laser_response(sensor, laser.wavelength_nm)
-    return np.asarray(lit.curve.irradiance * albedo / math.pi * _by_pixel(response, pixels) * _cos4(camera, lit))
+    return np.asarray(lit.curve.irradiance * lit.reflected / math.pi * _by_pixel(response, pixels) * _cos4(camera, lit))
 
 
 def pixel_share(position: Float, sigma: Float) -> Float:

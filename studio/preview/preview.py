@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +32,7 @@ from render.world.preview_shading import reflectance_at
 from render.world.triangles import Surface
 from render.world.world import place_meshes
 from studio.preview.preview_image import PreviewImage, Speed, preview_image
+from studio.preview.reflected_light import reflected_light
 from studio.project.project import Project
 
 Mask = NDArray[np.bool_]
@@ -46,6 +48,8 @@ class Body:
     """One mesh in its own frame."""
 
     surface: Surface
+    surface_at: Callable[[tuple[float, float, float]], Surface]
+    """The same with its materials at three wavelengths, nm."""
     rays: RayScene
     boxes: Float
     """(b, 6) `render.world.plane_culling`."""
@@ -95,6 +99,8 @@ class Lit:
     """(n, 3) unit facet normal towards the camera, camera frame."""
     albedo: Float
     """(n, 3) RGB."""
+    reflected: Float
+    """(n,) of the laser's light towards the camera: the reflectance of a diffuse surface that would be as bright."""
 
 
 class Preview:
@@ -143,7 +149,7 @@ class Preview:
                 )
             rays, boxes = self._rays[shape_key]
         bounds = np.stack([world.vertices.min(axis=0), world.vertices.max(axis=0)])
-        return Body(surface, rays, boxes, bounds)
+        return Body(surface, world.surface_at, rays, boxes, bounds)
 
     def look(self, project: Project, root: Path, step: int = 0, *, wait: bool = True) -> Look:
         """The project as it is. wait: load what is missing now; otherwise leave it out."""
@@ -223,7 +229,7 @@ class Look:
 
     def _cut(self, i: int) -> Lit:
         if not self.placed:
-            return Lit(_no_curve(self.project.extraction.axis), np.zeros((0, 3)), np.zeros((0, 3)))
+            return Lit(_no_curve(self.project.extraction.axis), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
         scene, laser = self.scene, self.scene.lasers[i]
         T_world_camera, T_world_laser = scene.T_world_camera(self.step), scene.T_world_laser(i, self.step)
         parts = [_cut_body(item, T_world_camera, T_world_laser) for item in self.placed]
@@ -245,18 +251,23 @@ class Look:
         )
         owner = curve.object_id
         points = transform_points(T_world_camera, curve.point)
-        albedo = np.empty((len(owner), 3))
+        albedo, reflected = np.empty((len(owner), 3)), np.empty(len(owner))
         for k, item in enumerate(self.placed):
             mine = place[owner] == k
             local = transform_points(item.T_object_world, points[mine])
             albedo[mine] = reflectance_at(item.body.surface, triangle[owner[mine]], local)
+            ends = transform_points(item.T_object_world, np.stack([T_world_camera[:3, 3], T_world_laser[:3, 3]]))
+            material = scene.visible_objects[item.index].material
+            reflected[mine] = reflected_light(
+                item.body.surface_at, material, laser.wavelength_nm, triangle[owner[mine]], local, *ends
+            )
         normal = normals[owner] @ T_world_camera[:3, :3]
         normal /= -np.sign(np.einsum("ij,ij->i", normal, curve.point))[:, None] * np.linalg.norm(
             normal, axis=1, keepdims=True
         )
         index = np.array([item.index for item in self.placed], dtype=np.int32)
         objects = index[place[owner]] if len(owner) else np.zeros(0, np.int32)
-        return Lit(dataclasses.replace(curve, object_id=objects), normal, albedo)
+        return Lit(dataclasses.replace(curve, object_id=objects), normal, albedo, reflected)
 
     def _trace_fan(self, i: int) -> Fan:
         scene, laser, T = self.scene, self.scene.lasers[i], self.scene.T_world_laser(i, self.step)

@@ -282,6 +282,8 @@ def _supposed(r: Readouts) -> tuple[str, Level]:
     wrong = []
     if r.blur_px is not None and r.blur_px.high > BLURRED_PX:
         wrong.append("in focus")
+    if r.spreads:
+        wrong.append("opaque")
     if r.saturated is not None and r.saturated > MUCH_SATURATED:
         wrong.append("unsaturated")
     return (f"as if {' and '.join(wrong)}", "warning") if wrong else ("", "")

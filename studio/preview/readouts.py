@@ -12,6 +12,7 @@ import numpy as np
 from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float
 from render.camera.camera import Camera
+from render.material.material import Subsurface
 from studio.preview import estimates
 from studio.preview.calibration_fit import CalibrationFit, calibration_fit
 from studio.preview.inspection import working_range
@@ -89,6 +90,8 @@ class Readouts:
     """Response of the extraction's detection to the line over the least that counts as one, median."""
     blur_px: Range | None = None
     """Diameter of the blur disc along the lit line."""
+    spreads: bool = False
+    """Light goes below some of the surfaces that are lit, and leaves beside the line."""
     blurs_images: bool = True
     """Images have that blur: their lens is rendered, or the sensor's defocus is switched on."""
     photon_sigma: float | None = None
@@ -170,6 +173,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         most_laser_electrons=None if (lit_by := _range(light)) is None else lit_by.high,
         ambient_electrons=float(np.median(ambient)),
         detected=_median(response / look.project.extraction.threshold),
+        spreads=any(isinstance(scene.visible_objects[i].material, Subsurface) for i in np.unique(curve.object_id)),
         blur_px=_range(estimates.blur_px(camera, curve.point)),
         photon_sigma=_median(bound * depth),
         speckle_sigma=_median(speckle * depth[some]),

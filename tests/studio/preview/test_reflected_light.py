@@ -1,0 +1,65 @@
+"""The signal that Design tells is that of the material: as bright as a render of its direct light."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from render.material.material import Coated, Conductor, Lambertian, Material, Subsurface
+from studio.notebook.frame import render
+from studio.preview.inspection import laser_views
+from studio.preview.preview import Preview
+from studio.preview.readouts import readouts
+from studio.preview.reflected_light import from_below
+from studio.project.project import Project
+from studio.scan.stages import scaled
+
+SCALE = 0.25
+
+
+def made_of(material: Material) -> Project:
+    """The sample's staircase and table."""
+    project = Project.load("step_block")
+    objects = {f"scene.objects[{i}].material": material for i in range(len(project.scene.objects))}
+    changed = {**objects, "render.transport": "direct", "scene.lights": (), "scene.environment": {}}
+    return scaled(project.replaced(changed), SCALE).in_folder(project.folder)
+
+
+@pytest.mark.parametrize(
+    "material",
+    [
+        Lambertian(albedo=0.8),
+        Conductor(metal="steel", roughness=0.1, roughness_across=0.35),
+        Conductor(metal="copper", roughness=0.4),
+        Coated(albedo=0.02, roughness=0.1),
+    ],
+    ids=["white", "ground steel", "rolled copper", "black plastic"],
+)
+def test_the_peak_of_any_opaque_material_is_as_rendered(material: Material) -> None:
+    """Ground steel was told to saturate by 15 times where its render had a hundredth of that."""
+    project = made_of(material)
+    told = readouts(Preview().look(project, project.folder), 0)
+    (seen,) = laser_views(project, render(project))
+    assert told.peak_electrons is not None and seen.peak_electrons is not None
+    assert told.peak_electrons.middle == pytest.approx(seen.peak_electrons, rel=0.15)
+
+
+def test_a_mirror_sends_nothing_of_the_line_to_the_camera() -> None:
+    project = made_of(Conductor(metal="silver", roughness=0.0))
+    told = readouts(Preview().look(project, project.folder), 0)
+    assert told.laser_electrons == pytest.approx(0.0, abs=1e-9)
+
+
+def test_light_from_below_is_that_of_a_half_space() -> None:
+    """Nothing is lost where scattering loses nothing; the open half-space is van de Hulst's, 0.7949 at 0.99."""
+    assert from_below(Subsurface(scattering_albedo=0.99999, index=1.01), 450.0) == pytest.approx(1.0, abs=0.015)
+    by_index = [from_below(Subsurface(scattering_albedo=0.99, index=n), 450.0) for n in (1.01, 1.3, 1.5)]
+    assert by_index[0] == pytest.approx(0.79, abs=0.01) and np.all(np.diff(by_index) < 0.0)
+
+
+def test_what_is_not_opaque_is_told() -> None:
+    project = Project.load("sphere")
+    last = len(project.scene.objects) - 1
+    wax = project.replaced({f"scene.objects[{last}].material": Subsurface()}).in_folder(project.folder)
+    for one, spreads in ((project, False), (wax, True)):
+        assert readouts(Preview().look(one, project.folder), 0).spreads == spreads
