@@ -8,13 +8,10 @@ from typing import Any
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QHideEvent, QShowEvent
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QHBoxLayout,
-    QHeaderView,
     QLabel,
     QMenu,
     QPushButton,
-    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -32,11 +29,11 @@ from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import keep_room, text_button
 from studio.qt.results.measure_tip import first_upper, measure_tip
-from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.part_drawing import PartDrawing
 from studio.qt.results.part_editor import PartEditor
 from studio.qt.results.part_menu import PartMenu
 from studio.qt.results.part_steps import PartSteps, value_of_worst
+from studio.qt.results.part_table import PartTable
 from studio.qt.results.results_profile import ProfilePlot
 from studio.qt.results.scan_bar import ScanBar
 from studio.scan.gauging import OF_SCAN, judged_over_steps, kept_readings, profiles, read_each
@@ -48,7 +45,6 @@ SECTION_TIP = (
     "List of sections, what measures and profile are of: the laser's plane, as a scanner delivers it, in which heights "
     "are longer where it leans; or a section across a direction along which the part is the same, where it is as drawn"
 )
-HEADINGS = ("Name", "Value", "Sigma", "Error", "Verdict")
 NONE_YET = "Add a measure and drag its regions in the profile or the row charts."
 
 
@@ -79,7 +75,7 @@ class PartTab(QWidget):
         self._read: tuple[Gauge, ...] = ()
         """The same, each of its laser as the shown render has it."""
         self.drawing = PartDrawing(profile.plot, self)
-        self.table = ReadOnlyTable()
+        self.table = PartTable()
         DeleteKey(self.table, self.delete)
         self.editor = PartEditor(session)
         self.add: QPushButton = text_button("Add", "Read another dimension off the profile")
@@ -278,6 +274,7 @@ class PartTab(QWidget):
                 self.table.selectRow(self.chosen)
         self.table.setVisible(bool(self._read))
         self.table.end_with_rows()
+        self.table.fit()
         index = self.chosen
         self.editor.show_gauge(index, self._read[index] if 0 <= index < len(self._read) else None)
         self.remove.setEnabled(index >= 0)
@@ -358,16 +355,6 @@ class PartTab(QWidget):
             asked.setToolTip(DEFINITIONS.get(kind, ""))
             asked.triggered.connect(partial(self._start_asked, kind))
         self.add.setMenu(menu)
-        self.table.setColumnCount(len(HEADINGS))
-        self.table.setHorizontalHeaderLabels(list(HEADINGS))
-        self.table.verticalHeader().hide()
-        self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        header = self.table.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        head = self.table.horizontalHeaderItem(0) or QTableWidgetItem()
-        head.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         buttons = QHBoxLayout()
         buttons.addWidget(self.add)
         buttons.addWidget(self.remove)
