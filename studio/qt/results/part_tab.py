@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, marked_verdict
+from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, marked_verdict, missing_of
 from analysis.report.units import NONE
 from studio.project.same_lasers import same_lasers
 from studio.qt.core import theme
@@ -332,7 +332,7 @@ class PartTab(QWidget):
             names = REGIONS[self.placing]
             count = f" ({len(self._placed) + 1} of {len(names)})" if len(names) > 1 else ""
             text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
-        elif entry is not None and (reason := entry["reason"] or entry["first_reason"]):
+        elif entry is not None and (reason := missing_of(entry)):
             text = first_upper(reason)
         elif gauge is not None and (odd := beside_nominal(gauge, None if entry is None else entry["value"])):
             text = odd
