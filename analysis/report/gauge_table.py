@@ -180,6 +180,14 @@ def counts_text(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{counts[name]} {names.get(name, name)}" for name in COUNTED if counts.get(name))
 
 
+def missing_of(row: Mapping[str, Any]) -> str:
+    """Why such an entry has no value, or why one of its steps has none, and which; empty: all have one."""
+    first = row.get("first_missing")
+    if row["reason"] or first is None or row["readings"] <= 1:
+        return str(row["reason"] or row.get("first_reason") or "")
+    return f"in step {first + 1}: {row['first_reason']}"
+
+
 def _first_of(row: Mapping[str, Any]) -> str:
     """Which of the steps without a value their reason is told of, where there are several; empty: records of former
     versions do not say."""

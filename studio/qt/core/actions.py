@@ -66,7 +66,9 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("export_xyz", "File/Export", "Points as &XYZ…", "", "", "Coordinates alone, a line a point"),
     Command("export_las", "File/Export", "Points as &LAS…", "", "", 'With the extra "points": laspy'),
     Command("export_e57", "File/Export", "Points as &E57…", "", "", 'With the extra "points": pye57'),
-    Command("export_film", "File/Export", "Fil&m of the scan…", "", "", "MP4: image and points, step by step"),
+    Command(
+        "export_film", "File/Export", "Fil&m of the scan…", "", "", "A video as MP4: image and points, step by step"
+    ),
     Command("export_heightmap", "File/Export", "&Height map of the scan…", "", "", "16 bit, with its scale beside it"),
     "File/Export/-",
     Command("screenshot", "File/Export", "&Screenshot of the window…", "Ctrl+Shift+P", "picture"),

@@ -22,6 +22,8 @@ from studio.qt.results.inside_text import InsideText
 
 NAME_AT, NAME_APART = 0.95, -0.08
 """Of the plot's height, from its top: names stand at the bottom, values beside their dimensions."""
+FILLED = 33
+"""Places along a dimension that its value is not to cover."""
 TO_PLOT = np.array([1e3, -1e3])
 """From across and height, m, to the plot's mm along the fan and mm from the laser."""
 
@@ -61,7 +63,8 @@ class PartDrawing(QObject):
                 self._line(dimension, pg.mkPen(colour, width=1.6, style=Qt.PenStyle.DashLine))
             if is_chosen and (curves or len(dimension)):
                 at = dimension.mean(axis=0) if len(dimension) else curves[0][-1]
-                self._text(label_of(one, step), at, colour)
+                drawn = np.concatenate([profile.position, *curves, _filled(dimension)])
+                self._text(label_of(one, step), at, colour, drawn)
 
     def show_regions(self, kind: Kind | None, regions: Sequence[tuple[float, float]] = ()) -> None:
         """Of one measure, as many as there are yet; once all are there they move, unless `locked`. None: of none."""
@@ -94,10 +97,15 @@ class PartDrawing(QObject):
         self.plot.addItem(item, ignoreBounds=True)
         self._items.append(item)
 
-    def _text(self, text: str, at: Float, colour: str) -> None:
-        item = InsideText(text, colour)
+    def _text(self, text: str, at: Float, colour: str, drawn: Float) -> None:
+        item = InsideText(text, colour, drawn * TO_PLOT)
         item.setPos(*(at * TO_PLOT))
         item.setZValue(40)
         self.plot.addItem(item, ignoreBounds=True)
         item.keep_inside()
         self.texts.append(item)
+
+
+def _filled(line: Float) -> Float:
+    """(k, 2) places along a line between two; none of an empty one."""
+    return line[:1] + np.linspace(0.0, 1.0, FILLED)[:, None] * (line[-1:] - line[:1])

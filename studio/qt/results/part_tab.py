@@ -7,13 +7,10 @@ from typing import Any
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QHideEvent, QShowEvent
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QHBoxLayout,
-    QHeaderView,
     QLabel,
     QMenu,
     QPushButton,
-    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -21,7 +18,7 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, marked_verdict
+from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, marked_verdict, missing_of
 from analysis.report.units import NONE
 from studio.project.same_lasers import same_lasers
 from studio.qt.core import theme
@@ -31,11 +28,11 @@ from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import keep_room, no_higher, text_button
 from studio.qt.results.measure_tip import first_upper, measure_tip
-from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.part_drawing import PartDrawing
 from studio.qt.results.part_editor import PartEditor
 from studio.qt.results.part_menu import PartMenu
 from studio.qt.results.part_steps import PartSteps, value_of_worst
+from studio.qt.results.part_table import PartTable
 from studio.qt.results.results_profile import ProfilePlot
 from studio.qt.results.scan_bar import ScanBar
 from studio.scan.gauging import OF_SCAN, judged_over_steps, kept_readings, profiles, read_each
@@ -47,7 +44,6 @@ SECTION_TIP = (
     "List of sections, what measures and profile are of: the laser's plane, as a scanner delivers it, in which heights "
     "are longer where it leans; or a section across a direction along which the part is the same, where it is as drawn"
 )
-HEADINGS = ("Name", "Value", "Sigma", "Error", "Verdict")
 NONE_YET = "Add a measure and drag its regions in the profile or the row charts."
 
 
@@ -78,7 +74,7 @@ class PartTab(QWidget):
         self._read: tuple[Gauge, ...] = ()
         """The same, each of its laser as the shown render has it."""
         self.drawing = PartDrawing(profile.plot, self)
-        self.table = ReadOnlyTable()
+        self.table = PartTable()
         DeleteKey(self.table, self.delete)
         self.editor = PartEditor(session)
         self.add: QPushButton = text_button("Add", "Read another dimension off the profile")
@@ -277,6 +273,7 @@ class PartTab(QWidget):
                 self.table.selectRow(self.chosen)
         self.table.setVisible(bool(self._read))
         self.table.end_with_rows()
+        self.table.fit()
         index = self.chosen
         self.editor.show_gauge(index, self._read[index] if 0 <= index < len(self._read) else None)
         self.remove.setEnabled(index >= 0)
@@ -334,7 +331,7 @@ class PartTab(QWidget):
             names = REGIONS[self.placing]
             count = f" ({len(self._placed) + 1} of {len(names)})" if len(names) > 1 else ""
             text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
-        elif entry is not None and (reason := entry["reason"] or entry["first_reason"]):
+        elif entry is not None and (reason := missing_of(entry)):
             text = first_upper(reason)
         elif gauge is not None and (odd := beside_nominal(gauge, None if entry is None else entry["value"])):
             text = odd
@@ -357,16 +354,6 @@ class PartTab(QWidget):
             asked.setToolTip(DEFINITIONS.get(kind, ""))
             asked.triggered.connect(lambda _checked, kind=kind: self.start(kind))
         self.add.setMenu(menu)
-        self.table.setColumnCount(len(HEADINGS))
-        self.table.setHorizontalHeaderLabels(list(HEADINGS))
-        self.table.verticalHeader().hide()
-        self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        header = self.table.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        head = self.table.horizontalHeaderItem(0) or QTableWidgetItem()
-        head.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         buttons = QHBoxLayout()
         buttons.addWidget(self.add)
         buttons.addWidget(self.remove)

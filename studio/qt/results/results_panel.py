@@ -378,7 +378,7 @@ class ResultsPanel(QWidget):
         for i, (part, stretch) in enumerate(parts):
             across.addWidget(part)
             across.setStretchFactor(i, stretch)
-        across.setSizes([480, 380, 360])
+        across.setSizes([430, 350, 440])
         content = QWidget()
         inside = QVBoxLayout(content)
         inside.setContentsMargins(8, 6, 8, 8)

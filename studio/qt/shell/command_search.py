@@ -11,6 +11,8 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtGui import QColor, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QDialog, QLineEdit, QListWidget, QListWidgetItem, QMenu, QVBoxLayout
 
+from analysis.gauges.gauge import TITLES, Kind
+from analysis.report.gauge_table import DEFINITIONS
 from studio.project.document import FieldPath
 from studio.qt.core import theme
 from studio.qt.scene.field_menu import named_fields
@@ -47,7 +49,7 @@ class CommandSearch(QDialog):
         self.setWindowTitle("Find a command or a field")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.window_of = window
-        self.entries = [*entries(window), *field_entries(window)]
+        self.entries = [*entries(window), *measure_entries(window), *field_entries(window)]
         self.line = QLineEdit()
         self.line.setPlaceholderText("A command, or a field of the project: a few letters of each word")
         self.line.setClearButtonEnabled(True)
@@ -129,6 +131,28 @@ def entries(window: MainWindow) -> list[Entry]:
         if isinstance(menu, QMenu):
             walk(menu, action.text().replace("&", ""))
     return listed
+
+
+def measure_entries(window: MainWindow) -> list[Entry]:
+    """Every kind of measure of the part, as its list has it, "Measures of the part > Add > Thickness"."""
+    render = window.session.shown
+    possible = render is not None and bool(render.measurements)
+
+    def start(kind: Kind) -> None:
+        window.call_panel("results")
+        window.panels["results"].part.start(kind)  # type: ignore[attr-defined]
+
+    return [
+        Entry(
+            title,
+            f"Measures of the part > Add > {title}",
+            "measures of the part dimension",
+            DEFINITIONS.get(kind, f"{title}: drag its regions in the profile"),
+            possible,
+            partial(start, kind),
+        )
+        for kind, title in TITLES.items()
+    ]
 
 
 def field_entries(window: MainWindow) -> list[Entry]:

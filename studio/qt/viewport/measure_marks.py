@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pyvista as pv
 from PySide6.QtCore import QObject
-from vtkmodules.vtkRenderingCore import vtkBillboardTextActor3D
+from vtkmodules.vtkRenderingCore import vtkBillboardTextActor3D, vtkTextRenderer
 
 from analysis.cloud import at_step
 from render.base.arrays import Float
@@ -19,9 +17,7 @@ from studio.qt.viewport.viewport_scene import Lines
 from studio.scan.measures_in_3d import MeasureIn3D
 
 MEASURE_PX, FONT_PX = 3.0, 13
-ASIDE_PX, ROW_PX = 8, 22
-NEAR = 0.15
-"""Of the extent of all points: texts of nearer places would cover each other, and stand in lines."""
+ASIDE_PX, APART_PX = 8, 4
 NOT_IN_THE_FONT = str.maketrans({"✓": None, "✗": None, "\u00a0": " "})
 GROUND = 0.9
 """Opacity of what a text stands on, over points of any colour."""
@@ -35,6 +31,7 @@ class MeasureMarks(QObject):
         self.session, self.view, self.cloud = session, view, cloud
         self._lines: list[Lines] = []
         self.labels: list[vtkBillboardTextActor3D] = []
+        self._drawn_before, view.before_paint = view.before_paint, self._before_paint
         session.measures_changed.connect(self.draw)
         session.step_changed.connect(self.draw)
         cloud.shown_changed.connect(self.draw)
@@ -48,20 +45,38 @@ class MeasureMarks(QObject):
             self.view.front.RemoveActor(label)
         self._lines, self.labels = [], []
         shown = self.session.measures_in_3d if self.cloud.visible else ()
-        for i, one in enumerate(shown):
-            self._add(one, self._row_of(one.place, shown[:i]))
+        for one in shown:
+            self._add(one)
+        self.arrange()
         for line in self._lines:
             self.view.renderer.AddActor(line.actor)
         for label in self.labels:  # before all points, which would cover its first letters
             self.view.front.AddActor(label)
         self.view.redraw()
 
-    def _row_of(self, place: Float, before: Sequence[MeasureIn3D]) -> int:
-        """How many of the texts before it stand near its own."""
-        near = NEAR * float(np.linalg.norm(np.ptp(self.cloud.points, axis=0))) if len(self.cloud.points) else 0.0
-        return sum(float(np.linalg.norm(other.place - place)) < near for other in before)
+    def _before_paint(self) -> None:
+        self._drawn_before()
+        self.arrange()
 
-    def _add(self, one: MeasureIn3D, row: int) -> None:
+    def arrange(self) -> None:
+        """Each text aside of its place as it is seen now, above those that would cover it."""
+        if not self.labels:
+            return
+        scale, dpi = self.view.devicePixelRatioF(), self.view.ren_win.GetDPI()
+        places = np.array([label.GetPosition() for label in self.labels])
+        seen = scale * self.view.eye.project(places, self.view.pixels) * [1.0, -1.0]
+        taken: list[Float] = []
+        for label, at in zip(self.labels, seen, strict=True):
+            box = [0, 0, 0, 0]
+            vtkTextRenderer.GetInstance().GetBoundingBox(label.GetTextProperty(), label.GetInput(), box, dpi)
+            size = np.array([box[1] - box[0], box[3] - box[2]]) + APART_PX
+            low = at + ASIDE_PX
+            while covering := [one for one in taken if np.all(low < one[1]) and np.all(one[0] < low + size)]:
+                low = np.array([low[0], max(one[1][1] for one in covering)])
+            label.SetDisplayOffset(ASIDE_PX, round(float(low[1] - at[1])) if np.isfinite(at).all() else ASIDE_PX)
+            taken.append(np.array([low, low + size]))
+
+    def _add(self, one: MeasureIn3D) -> None:
         scene, step = self.session.project.scene, self.session.step
         colour = theme.verdict_colour(one.verdict)
         for line in one.lines:
@@ -73,7 +88,6 @@ class MeasureMarks(QObject):
         label = vtkBillboardTextActor3D()
         label.SetInput(" ".join(one.text.translate(NOT_IN_THE_FONT).split()))
         label.SetPosition(*at_step(one.place[None], scene, step)[0])
-        label.SetDisplayOffset(ASIDE_PX, ASIDE_PX + ROW_PX * row)
         look = label.GetTextProperty()
         look.SetFontSize(FONT_PX)
         look.BoldOn()

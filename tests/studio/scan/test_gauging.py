@@ -15,7 +15,7 @@ from click.testing import CliRunner
 import main
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.read import MISFITS, OTHER_SHAPE, Reading
-from analysis.report.gauge_table import cells, over_steps, reasons, worst_of
+from analysis.report.gauge_table import cells, missing_of, over_steps, reasons, worst_of
 from analysis.report.units import NONE
 from render.base.errors import InputError
 from render.run import Run
@@ -224,7 +224,10 @@ def test_a_stray_step_is_not_the_worst_and_what_the_others_come_to_is_told() -> 
     for alone in (good[:1], [stray], []):
         assert over_steps([measures_record((gauge,), alone)[0]]) == []
     assert over_steps([{**row, "over_steps": None}]) == [], "of a former version"
+    assert missing_of(row).startswith("in step 15: the exact line does not reach"), "as the window tells it"
+    assert missing_of(measures_record((gauge,), good)[0]) == ""
     alone = judged_over_steps(gauge, [stray])
+    assert missing_of(alone) == alone["reason"]
     assert alone["reason"] and alone["value"] is None, "a step that is looked at is judged alike"
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from analysis.gauges.gauge import TITLES
+from studio.qt.core.render import Render
 from studio.qt.forms.form import Section
 from studio.qt.shell.command_search import CommandSearch
 from studio.qt.shell.window import MainWindow
+from tests.studio.qt.small_session import small_project, small_render
 
 
 def test_a_command_is_found_by_a_few_letters_and_done(window: MainWindow, qtbot: QtBot) -> None:
@@ -67,3 +71,33 @@ def test_what_removes_the_calibration_is_found_by_that_word(window: MainWindow, 
     texts = [search.list.item(i).text() for i in range(search.list.count())]
     assert "Calibrate > Remove it from the project" in texts
     assert "Calibrate > Use it in the project" in texts
+
+
+@pytest.mark.parametrize(
+    ("typed", "text"),
+    [("thickness", "Measures of the part > Add > Thickness"), ("video", "File > Export > Film of the scan")],
+)
+def test_what_is_called_otherwise_or_is_in_a_panel_is_found(
+    window: MainWindow, qtbot: QtBot, typed: str, text: str
+) -> None:
+    """Neither word found anything."""
+    search = CommandSearch(window)
+    qtbot.addWidget(search)
+    search.show_found(typed)
+    assert text in [search.list.item(i).text() for i in range(search.list.count())]
+
+
+def test_a_measure_is_added_from_the_search_once_there_is_a_profile(window: MainWindow, qtbot: QtBot) -> None:
+    session, before = window.session, CommandSearch(window)
+    qtbot.addWidget(before)
+    of_kinds = {entry.name: entry for entry in before.entries if entry.text.startswith("Measures of the part")}
+    assert set(of_kinds) == set(TITLES.values()) and not any(entry.possible for entry in of_kinds.values())
+    with qtbot.waitSignal(session.measured, timeout=20_000):
+        session.add_render(Render(1, small_project(), *small_render()))
+    search = CommandSearch(window)
+    qtbot.addWidget(search)
+    search.show_found("thickness")
+    search.choose()
+    part = window.panels["results"].part  # type: ignore[attr-defined]
+    qtbot.waitUntil(lambda: part.placing == "thickness")
+    part.cancel()
