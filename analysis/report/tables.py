@@ -106,14 +106,15 @@ def scene_tables(report: ReportInput) -> Tables:
     lens = camera.lens
     focus = "far away" if lens.focus_distance is None else millimetres(lens.focus_distance)
     rendered = "through its aperture" if lens.model == "thin-lens" else "as a pinhole"
+    optics = f"{millimetres(camera.focal_length)}, f/{lens.f_number:g}, transmission {lens.transmission:g}"
     shape = f"fx {camera.fx:.2f}, fy {camera.fy:.2f}, cx {camera.cx:.2f}, cy {camera.cy:.2f}, skew {camera.skew:.3g} px"
     tables: Tables = {
         "Camera": {
             "Image": f"{camera.width} × {camera.height} px of {micrometres(camera.pixel_pitch)}",  # noqa: RUF001
             "Intrinsics": shape + " (pixel centres at integers)",
-            "Image distance": millimetres(camera.fx * camera.pixel_pitch),
+            "Image distance": millimetres(camera.image_distance),
             "Distortion": ", ".join(f"{c:.6g}" for c in camera.distortion) if camera.has_distortion else "none",
-            "Lens": f"f/{lens.f_number:g}, transmission {lens.transmission:g}, focused {focus}; rendered {rendered}",
+            "Lens": f"{optics}, focused {focus}; rendered {rendered}",
         }
     }
     for i, laser in enumerate(scene.lasers):

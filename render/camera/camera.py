@@ -45,7 +45,12 @@ class Lens(Model):
     f_number: float = quantity(1.4, label="f-number", help="Focal length over entrance pupil.", ge=0.1, le=256)
     transmission: UnitInterval = quantity(0.9, label="Transmission", help="Of lens and filter, at the laser.")
     focus_distance: float | None = quantity(
-        None, unit="m", label="Focus distance", help="Empty: far away.", ge=1e-3, le=1e6
+        None,
+        unit="m",
+        label="Focus distance",
+        help="Empty: far away. Focusing leaves the image distance, and so fx.",
+        ge=1e-3,
+        le=1e6,
     )
     vignetting: bool = quantity(True, label="Natural vignetting", help="cos^4 fall-off towards the corners.")
 
@@ -80,7 +85,7 @@ class Camera(Model):
     @model_validator(mode="after")
     def _lens_is_possible(self) -> Camera:
         if self.lens.model == "thin-lens":
-            image_distance, focus = self.fx * self.pixel_pitch, self.lens.focus_distance
+            image_distance, focus = self.image_distance, self.lens.focus_distance
             if self.lens.f_number < FASTEST:
                 raise ValueError(
                     f"lens.f_number is {self.lens.f_number:g}; allowed for a thin lens: {FASTEST:g} or more, the limit "
@@ -88,8 +93,8 @@ class Camera(Model):
                 )
             if focus is not None and focus <= image_distance:
                 raise ValueError(
-                    f"lens.focus_distance is {1e3 * focus:.4g} mm; allowed for a thin lens: more than the focal "
-                    f"length, {1e3 * image_distance:.4g} mm (fx times pixel pitch)"
+                    f"lens.focus_distance is {1e3 * focus:.4g} mm; allowed for a thin lens: more than the image "
+                    f"distance, {1e3 * image_distance:.4g} mm (fx times pixel pitch)"
                 )
         return self
 
@@ -142,10 +147,14 @@ class Camera(Model):
         return any(c != 0.0 for c in self.distortion)
 
     @property
+    def image_distance(self) -> float:
+        """From the lens to the sensor, m."""
+        return self.fx * self.pixel_pitch
+
+    @property
     def focal_length(self) -> float:
         """Focal length f of the thin lens, m: 1 / f = 1 / image distance + 1 / focus distance."""
-        image_distance = self.fx * self.pixel_pitch
-        return image_distance / (1.0 + image_distance * self.focus_vergence)
+        return self.image_distance / (1.0 + self.image_distance * self.focus_vergence)
 
     @property
     def focus_vergence(self) -> float:
@@ -161,16 +170,15 @@ class Camera(Model):
     def focus_plane(self) -> Array:
         """(4,) plane of focus in the camera frame, tilted with the sensor: -g1 X - g2 Y + Z / s - 1 = 0."""
         tau_x, tau_y = self.coefficients[12:]
-        image_distance = self.fx * self.pixel_pitch
-        g1 = math.tan(tau_y) / math.cos(tau_x) / image_distance
-        return np.array([-g1, math.tan(tau_x) / image_distance, self.focus_vergence, -1.0])
+        g1 = math.tan(tau_y) / math.cos(tau_x) / self.image_distance
+        return np.array([-g1, math.tan(tau_x) / self.image_distance, self.focus_vergence, -1.0])
 
     @property
     def working_f_number(self) -> float:
         """Working f-number N (1 + m), m the magnification of the focused plane."""
         if self.lens.focus_distance is None:
             return self.lens.f_number
-        return self.lens.f_number * (1.0 + self.fx * self.pixel_pitch / self.lens.focus_distance)
+        return self.lens.f_number * (1.0 + self.image_distance / self.lens.focus_distance)
 
     def scaled(self, scale: float) -> Camera:
         """The same view with `scale` times the pixels a side (pixel-centre convention kept).

@@ -35,7 +35,7 @@ ROWS = 64
 
 def disc_diameter(camera: Camera, depth_z: Float32) -> Float:
     """(h, w) diameter in px of the disc of confusion at depths (h, w) m; 0 where there is none."""
-    image_distance = camera.fx * camera.pixel_pitch
+    image_distance = camera.image_distance
     focus = camera.lens.focus_distance
     focal = image_distance if focus is None else 1.0 / (1.0 / image_distance + 1.0 / focus)
     vergence = 0.0 if focus is None else 1.0 / focus

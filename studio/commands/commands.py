@@ -311,10 +311,10 @@ def _project_rows(project: Project, found: Inspection) -> list[tuple[str, str]]:
     camera, sensor, settings = project.scene.camera, project.sensor, project.extraction
     focus = camera.lens.focus_distance
     rows = [
-        ("camera", f"{camera.width} x {camera.height} px, f {camera.fx * camera.pixel_pitch * 1e3:.2f} mm, "
-                   f"f/{camera.lens.f_number:g}, {camera.pixel_pitch * 1e6:.2f} um pixels"),
-        ("lens", f"focused {'far away' if focus is None else f'at {focus * 1e3:g} mm'}, rendered as a "
-                 + camera.lens.model.replace("-", " ")),
+        ("camera", f"{camera.width} x {camera.height} px of {camera.pixel_pitch * 1e6:.2f} um"),
+        ("lens", f"{camera.focal_length * 1e3:.4g} mm, f/{camera.lens.f_number:g}, focused "
+                 f"{'far away' if focus is None else f'at {focus * 1e3:g} mm'}, image distance "
+                 f"{camera.image_distance * 1e3:.4g} mm, rendered as a {camera.lens.model.replace('-', ' ')}"),
         ("sensor", f"{sensor.colour}, {sensor.bits} bit, exposure {Unit.of('s').with_unit(sensor.exposure_time)}, "
                    f"full well {sensor.full_well:.0f} e-, read noise {sensor.read_noise:g} e-"),
     ]  # fmt: skip

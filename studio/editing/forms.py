@@ -150,6 +150,8 @@ def describe(model: BaseModel) -> tuple[FieldSpec, ...]:
         value, stored = derived.read(model), specs[place]
         if stored.high is not None and stored.value:
             limits["high"] = stored.high * value / stored.value  # as much as what it is stored as, told in its own unit
+        if (below := derived.below(model)) is not None:
+            limits |= {"high": below, "high_open": True}
         specs.insert(
             place,
             FieldSpec(derived.name, derived.label, derived.help, "number", value, assign=derived.assign, **limits),

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
+from render.base.errors import InputError
 from render.camera.camera import Camera
 from render.sensor.sensor import Sensor, SpectralCurve
 
@@ -37,17 +38,34 @@ class Derived:
     """The field it is shown in front of."""
     read: Callable[[Any], float]
     assign: Assign
+    below: Callable[[Any], float | None] = lambda model: None
+    """What it must be less than, beside the limit of the field that stores it."""
 
 
-def focal_length(camera: Camera) -> float:
-    """m; of the camera model, which is the lens's own where it is focused far away."""
-    return camera.fx * camera.pixel_pitch
+def with_image_distance(camera: Camera, value: float) -> dict[str, Any]:
+    """fx and fy for a distance (m) from the lens to the sensor; their ratio stays."""
+    fx = value / camera.pixel_pitch
+    return {"fx": fx, "fy": fx * camera.fy / camera.fx}
 
 
 def with_focal_length(camera: Camera, value: float) -> dict[str, Any]:
-    """fx and fy for a focal length (m); their ratio stays."""
-    fx = value / camera.pixel_pitch
-    return {"fx": fx, "fy": fx * camera.fy / camera.fx}
+    """fx and fy for a lens of a focal length (m) that is focused where the camera's is.
+
+    InputError: it is as far away as the focus, or farther.
+    """
+    if value == camera.focal_length:
+        return {}  # rounding would change it
+    focus = camera.lens.focus_distance
+    if focus is None:
+        return with_image_distance(camera, value)
+    if value >= focus:
+        raise InputError(
+            "no lens of that focal length is focused there",
+            where="focal length of the camera",
+            found=f"{1e3 * value:.4g} mm",
+            allowed=f"less than the focus distance, {1e3 * focus:.4g} mm",
+        )
+    return with_image_distance(camera, value * focus / (focus - value))
 
 
 def with_width(camera: Camera, value: int) -> dict[str, Any]:
@@ -100,11 +118,24 @@ DERIVED: dict[type[BaseModel], tuple[Derived, ...]] = {
         Derived(
             "focal_length",
             "Focal length",
-            "fx times the pixel pitch; typing it sets fx and fy. The lens's own where it is focused far away.",
+            "Of the lens, by image distance and focus distance: 1/f = 1/image distance + 1/focus distance. Typing it "
+            "sets the image distance, with fx and fy. Focusing keeps the image distance, as a calibrated camera keeps "
+            "its geometry, so that this one follows.",
             "m",
             "fx",
-            focal_length,
+            lambda camera: camera.focal_length,
             with_focal_length,
+            lambda camera: camera.lens.focus_distance,
+        ),
+        Derived(
+            "image_distance",
+            "Image distance",
+            "From the lens to the sensor: fx times the pixel pitch; typing it sets fx and fy. Where the lens is "
+            "focused far away it is the focal length.",
+            "m",
+            "fx",
+            lambda camera: camera.image_distance,
+            with_image_distance,
         ),
     )
 }

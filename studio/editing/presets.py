@@ -12,7 +12,7 @@ from render.camera.camera import Camera, Lens
 from render.laser.laser import LineLaser
 from render.scene.scene import SceneObject
 from render.sensor.sensor import Sensor
-from studio.editing.linked_fields import focal_length, with_focal_length, with_height, with_pixel_pitch, with_width
+from studio.editing.linked_fields import with_height, with_image_distance, with_pixel_pitch, with_width
 from studio.project.document import FieldPath, replaced, value_at
 from studio.project.project import Project
 from studio.project.strict_json import read_object
@@ -74,7 +74,7 @@ def presets_for(project: Project, path: FieldPath) -> tuple[Preset, ...]:
 def with_preset(project: Project, path: FieldPath, preset: Preset) -> Project:
     """The project with a preset's values: the laser's or object's at `path`, the camera's and sensor's at their place.
 
-    Poses, names and exposure stay. A sensor without a lens keeps the camera's focal length. InputError: does not fit.
+    Poses, names and exposure stay. A sensor without a lens keeps the camera's image distance. InputError: does not fit.
     """
     for at_path in preset.values.keys() & {"laser", "object"}:
         project = _merged(project, path, preset.values[at_path])
@@ -102,7 +102,7 @@ def with_camera_values(camera: Camera, values: dict[str, Any]) -> dict[str, Any]
         (with_width, values.get("width", camera.width)),
         (with_height, values.get("height", camera.height)),
         (with_pixel_pitch, values.get("pixel_pitch", camera.pixel_pitch)),
-        (with_focal_length, values.get("focal_length", focal_length(camera))),
+        (with_image_distance, values.get("focal_length", camera.image_distance)),
     )
     for step, value in steps:
         changed = changed.model_copy(update=step(changed, value))

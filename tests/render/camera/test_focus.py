@@ -77,7 +77,7 @@ def test_a_lens_that_cannot_be_is_refused_by_name():
     for lens, message in (
         ({"f_number": 0.0}, "greater than or equal to 0.1"),
         ({"f_number": 0.4}, "0.5 or more"),
-        ({"focus_distance": 0.011}, "more than the focal length, 12 mm"),
+        ({"focus_distance": 0.011}, "more than the image distance, 12 mm"),
         ({"model": "fisheye"}, "thin-lens"),
     ):
         with pytest.raises(ValidationError, match=message):

@@ -34,7 +34,7 @@ from studio.editing.forms import (
     start_value,
 )
 from studio.editing.units import Unit
-from studio.project.document import value_at
+from studio.project.document import replaced, value_at
 from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, template_folder
 
@@ -77,7 +77,7 @@ class TestDescription:
         fields = [field for field in describe(project.scene.camera) if field.kind == "number"]
         shown = {field.name: field.unit.with_unit(field.value) for field in fields}
         assert shown["pixel_pitch"] == "3.45 µm"
-        assert shown["focal_length"] == "12 mm"
+        assert shown["image_distance"] == "12 mm"
         assert spec(Divergence(), "full_angle").unit.with_unit(1.15e-3) == "1.15 mrad"
         assert spec(Waist(), "radius").unit.with_unit(1e-4) == "100 µm"
         assert spec(project.scene.lasers[0], "fan_angle").unit.with_unit(math.radians(45)) == "45 deg"
@@ -230,15 +230,31 @@ class TestMaterials:
 
 
 class TestLinkedFields:
-    def test_a_focal_length_is_bounded_as_fx_is_and_in_its_own_unit(self, project: Project) -> None:
+    def test_an_image_distance_is_bounded_as_fx_is_and_in_its_own_unit(self, project: Project) -> None:
         """1e9 mm was refused with the limit of fx, in px and without a unit, which it was below."""
         camera = project.scene.camera
-        assert spec(camera, "focal_length").high == pytest.approx(1e7 * camera.pixel_pitch)
+        assert spec(camera, "image_distance").high == pytest.approx(1e7 * camera.pixel_pitch)
 
-    def test_a_typed_focal_length_sets_fx_and_fy(self, project: Project) -> None:
-        changed = edited(project, CAMERA, spec(project.scene.camera, "focal_length"), 0.016)
+    def test_a_typed_image_distance_sets_fx_and_fy(self, project: Project) -> None:
+        changed = edited(project, CAMERA, spec(project.scene.camera, "image_distance"), 0.016)
         assert changed.scene.camera.fx == pytest.approx(0.016 / 3.45e-6)
         assert changed.scene.camera.fy == changed.scene.camera.fx
+
+    def test_a_focal_length_is_of_the_lens_that_is_focused(self, project: Project) -> None:
+        """25 mm were told of a lens that is one of 23.54 mm when it is focused at 403 mm."""
+        far = replaced(project, (*CAMERA, "lens", "focus_distance"), None)
+        project = edited(far, CAMERA, spec(far.scene.camera, "image_distance"), 0.025)
+        camera = project.scene.camera
+        assert spec(camera, "focal_length").value == spec(camera, "image_distance").value == pytest.approx(0.025)
+        near = replaced(project, (*CAMERA, "lens", "focus_distance"), 0.403)
+        assert near.scene.camera.fx == camera.fx, "a calibrated camera keeps its geometry"
+        own = spec(near.scene.camera, "focal_length")
+        assert own.unit.with_unit(float(f"{own.value:.4g}")) == "23.54 mm"
+        assert spec(near.scene.camera, "image_distance").value == pytest.approx(0.025)
+        real = edited(near, CAMERA, own, 0.025).scene.camera
+        assert real.fx * real.pixel_pitch == pytest.approx(1.0 / (1.0 / 0.025 - 1.0 / 0.403))
+        assert real.focal_length == pytest.approx(0.025) and real.lens.focus_distance == 0.403
+        assert own.problem(0.402) is None and own.problem(0.403) == "must be less than 403 mm"
 
     def test_a_centred_principal_point_stays_centred_and_another_stays_put(self, project: Project) -> None:
         width = spec(project.scene.camera, "width")

@@ -78,7 +78,7 @@ class TestDraft:
             desk.session.select(item)
             specs = [rows[0].spec for rows in desk.inspector.form.rows.values() if not rows[0].varied()]
             without |= {spec.name for spec in specs if spec.kind in VALUES}
-        assert without == {"focal_length", "method"}
+        assert without == {"focal_length", "image_distance", "method"}
 
     def test_the_estimate_counts_cells_and_what_shares_a_render(self, qtbot: QtBot, desk: Desk) -> None:
         desk.small([2.0, 4.0, 8.0])
