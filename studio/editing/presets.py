@@ -12,7 +12,13 @@ from render.camera.camera import Camera, Lens
 from render.laser.laser import LineLaser
 from render.scene.scene import SceneObject
 from render.sensor.sensor import Sensor
-from studio.editing.linked_fields import with_height, with_image_distance, with_pixel_pitch, with_width
+from studio.editing.linked_fields import (
+    with_focal_length,
+    with_height,
+    with_image_distance,
+    with_pixel_pitch,
+    with_width,
+)
 from studio.project.document import FieldPath, replaced, value_at
 from studio.project.project import Project
 from studio.project.strict_json import read_object
@@ -22,6 +28,8 @@ FOLDER = Path(__file__).resolve().parents[2] / "assets" / "presets"
 
 CAMERA: FieldPath = ("scene", "rig", "camera")
 SENSOR: FieldPath = ("sensor",)
+NEAREST = 2.0
+"""Focal lengths, at which the image is as large as the object."""
 
 
 @dataclass(frozen=True)
@@ -71,24 +79,34 @@ def presets_for(project: Project, path: FieldPath) -> tuple[Preset, ...]:
     return presets(kind) if kind else ()
 
 
-def with_preset(project: Project, path: FieldPath, preset: Preset) -> Project:
+def leaves_focus_open(preset: Preset) -> bool:
+    """It is of a lens that its source does not say the focus of."""
+    return "focal_length" in (camera := preset.values.get("camera", {})) and camera.get("focus_distance") is None
+
+
+def with_preset(project: Project, path: FieldPath, preset: Preset, focus: float | None = None) -> Project:
     """The project with a preset's values: the laser's or object's at `path`, the camera's and sensor's at their place.
 
-    Poses, names and exposure stay. A sensor without a lens keeps the camera's image distance. InputError: does not fit.
+    Poses, names and exposure stay. A sensor without a lens keeps the camera's image distance. focus: m, of a lens whose
+    preset leaves it open; far away at less than a lens can be focused at. InputError: does not fit.
     """
     for at_path in preset.values.keys() & {"laser", "object"}:
         project = _merged(project, path, preset.values[at_path])
     if "camera" in preset.values:
-        camera = with_camera_values(project.scene.camera, preset.values["camera"])
+        values = preset.values["camera"]
+        if focus is not None and leaves_focus_open(preset) and focus > NEAREST * values["focal_length"]:
+            values = values | {"focus_distance": focus}
+        camera = with_camera_values(project.scene.camera, values, own_focal_length=leaves_focus_open(preset))
         project = _merged(project, CAMERA, camera)
     if "sensor" in preset.values:
         project = _merged(project, SENSOR, preset.values["sensor"])
     return project
 
 
-def with_camera_values(camera: Camera, values: dict[str, Any]) -> dict[str, Any]:
+def with_camera_values(camera: Camera, values: dict[str, Any], own_focal_length: bool = False) -> dict[str, Any]:
     """Fields of the camera for width, height, pixel_pitch, focal_length (all m or px), f_number, focus_distance.
 
+    own_focal_length: that of the lens, which is farther from its image when it is focused, and not the image distance.
     Another sensor or lens has another distortion, so with a focal length it is cleared and the centre centred.
     """
     changed = camera
@@ -102,7 +120,9 @@ def with_camera_values(camera: Camera, values: dict[str, Any]) -> dict[str, Any]
         (with_width, values.get("width", camera.width)),
         (with_height, values.get("height", camera.height)),
         (with_pixel_pitch, values.get("pixel_pitch", camera.pixel_pitch)),
-        (with_image_distance, values.get("focal_length", camera.image_distance)),
+        (with_focal_length, values["focal_length"])
+        if own_focal_length
+        else (with_image_distance, values.get("focal_length", camera.image_distance)),
     )
     for step, value in steps:
         changed = changed.model_copy(update=step(changed, value))

@@ -16,6 +16,7 @@ from studio.editing.placement import working_distance
 from studio.editing.placing import aimed, at_angle
 from studio.editing.units import Unit
 from studio.preview.estimates import SHARP_PX, dioptre_px
+from studio.preview.focusing import between
 from studio.preview.inspection import NARROW_PX, WIDE_PX
 from studio.preview.preview import Look
 from studio.preview.readout_rows import SATURATED
@@ -230,8 +231,7 @@ def _stopped(project: Project, now: Readouts, number: float, times: float) -> Ch
 
 
 def _focus(project: Project, distance: Range) -> Step | None:
-    depth = float(f"{2.0 / (1.0 / distance.low + 1.0 / distance.high):.4g}")
-    return _number(project, "focus", (*LENS, "focus_distance"), "m", depth)
+    return _number(project, "focus", (*LENS, "focus_distance"), "m", between(distance.low, distance.high))
 
 
 def _exposed_by(project: Project, times: float) -> Step | None:

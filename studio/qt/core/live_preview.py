@@ -15,6 +15,7 @@ from render.scene.scene import SceneObject
 from studio.preview.inside import inside
 from studio.preview.preview import Look, Preview
 from studio.preview.problem_fields import problem_fields
+from studio.project.project import Project
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, one_of
 from studio.runtime.jobs import Progress
@@ -65,6 +66,12 @@ class Live(QObject):
         """Of the motion; what is shown stands where this step puts it."""
         return min(self.session.step, self.session.project.scene.frame_count - 1)
 
+    def look_at(self, project: Project) -> Look:
+        """At another project, of what is loaded by now; nothing is waited for."""
+        if not self.ready:
+            return Look(project, self.step, (), self.preview)
+        return self.preview.look(project, self.session.document.root, self.step, wait=False)
+
     def show_step(self, step: int) -> None:
         """Stand where a step of the motion puts things."""
         self.session.look_at_step(step)
@@ -90,9 +97,9 @@ class Live(QObject):
 
     def _looked(self) -> Look:
         session = self.session
+        look = self.look_at(session.project)
         if not self.ready:
-            return Look(session.project, self.step, (), self.preview)
-        look = self.preview.look(session.project, session.document.root, self.step, wait=False)
+            return look
         for error in self.preview.errors.values():
             if str(error) not in self._told:
                 self._told.add(str(error))

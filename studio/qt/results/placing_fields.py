@@ -176,9 +176,7 @@ class PlacingFields(QObject):
         return project
 
     def _read(self, key: str, project: Project) -> float | None:
-        view = live(self.session)
-        look = view.preview.look(project, self.session.document.root, view.step, wait=False)
-        return _values(readouts(look, self.laser))[key]
+        return _values(readouts(live(self.session).look_at(project), self.laser))[key]
 
 
 def _pose_of(laser: int) -> FieldPath:

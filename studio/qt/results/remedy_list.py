@@ -7,9 +7,7 @@ from functools import partial
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QGridLayout, QLabel, QPushButton, QWidget
 
-from studio.preview.preview import Look
 from studio.preview.remedies import Remedy, remedies
-from studio.project.project import Project
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import text_button
@@ -53,7 +51,7 @@ class RemedyList(QWidget):
         if session.dragging:
             self._timer.start()
         elif self._live.ready and self.laser < len(self._live.look.scene.lasers):
-            self._show(remedies(self._live.look, self.laser, self._look_at))
+            self._show(remedies(self._live.look, self.laser, self._live.look_at))
 
     def apply(self, remedy: Remedy) -> None:
         """Change the project; what was found for another one is looked for again."""
@@ -62,9 +60,6 @@ class RemedyList(QWidget):
             self.session.message.emit("info", sentence(remedy))
         else:
             self._timer.start()
-
-    def _look_at(self, project: Project) -> Look:
-        return self._live.preview.look(project, self.session.document.root, self._live.step, wait=False)
 
     def _show(self, found: tuple[Remedy, ...]) -> None:
         self.setVisible(bool(found))

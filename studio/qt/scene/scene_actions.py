@@ -15,10 +15,13 @@ from render.scene.scene import SceneObject
 from render.scene.shape import Box, Cylinder, Plane, Sphere, StepBlock, VGroove, WeldTee
 from studio.editing import scene_edits
 from studio.editing.forms import kind_label
-from studio.editing.presets import Preset, presets_for, with_preset
+from studio.editing.presets import Preset, leaves_focus_open, presets_for, with_preset
 from studio.editing.refusals import refusal
+from studio.editing.units import Unit
+from studio.preview.focusing import line_depth, looked_at
 from studio.project.document import FieldPath, value_at
 from studio.project.project import Project
+from studio.qt.core.live_preview import live
 from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.session import Session
 from studio.qt.scene.mesh_importer import choose_meshes
@@ -141,16 +144,32 @@ def fill_presets_menu(menu: QMenu, session: Session) -> None:
 
         def use(preset: Preset = preset) -> None:
             def edit(project: Project) -> scene_edits.Result:
-                return with_preset(project, path, preset), path
+                return _with_preset(session, project, path, preset), path
 
             refused = f"{preset.name} is not taken, nothing has changed: "
             if apply(session, f"preset {preset.name}", edit, refused):
-                session.message.emit("info", f"{preset.name}. {preset.source}")
+                session.message.emit("info", f"{preset.name}{_focused(session.project, preset)}. {preset.source}")
 
         # rich text, so that a tool tip breaks its lines
         _entry(menu, preset.name, "", use).setToolTip(f"<p>{preset.source}</p>")
     if not found:
         menu.addAction("Select the camera, the sensor, a laser or an object").setEnabled(False)
+
+
+def _with_preset(session: Session, project: Project, path: FieldPath, preset: Preset) -> Project:
+    """A lens whose preset says no focus is focused on the line that it sees, else where the one before looked."""
+    taken = with_preset(project, path, preset)
+    if not leaves_focus_open(preset):
+        return taken
+    depth = line_depth(live(session).look_at(taken)) or looked_at(project.scene)
+    return with_preset(project, path, preset, depth)
+
+
+def _focused(project: Project, preset: Preset) -> str:
+    focus = project.scene.camera.lens.focus_distance
+    if not leaves_focus_open(preset):
+        return ""
+    return ", focused far away" if focus is None else f", focused at {Unit.of('m').with_unit(focus)}"
 
 
 def _changeable(session: Session) -> list[FieldPath]:

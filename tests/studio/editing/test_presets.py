@@ -11,7 +11,7 @@ import pytest
 
 from render.material.material import Blend, Subsurface
 from render.sensor.response import laser_response
-from studio.editing.presets import Preset, PresetKind, presets, presets_for, with_preset
+from studio.editing.presets import Preset, PresetKind, leaves_focus_open, presets, presets_for, with_preset
 from studio.project.document import Document, replaced, value_at
 from studio.project.project import Project
 from studio.project.templates import template_folder
@@ -110,6 +110,20 @@ def test_a_lens_preset_clears_the_distortion_of_the_lens_before(project: Project
     camera = with_preset(bent, CAMERA, named("cameras", "16 mm")).scene.camera
     assert camera.distortion == ()
     assert camera.cx == 1223.5
+
+
+def test_a_lens_without_a_stated_focus_is_focused_where_it_is_asked_to_and_stays_that_lens(project: Project) -> None:
+    """It was focused far away, whatever stood before it, and a lens of 25 mm focused at hand is no longer one."""
+    stated, open_ = named("cameras", "STC-MCS500U3V"), named("cameras", "12 mega")
+    assert leaves_focus_open(open_) and not leaves_focus_open(stated)
+    assert not any(leaves_focus_open(preset) for preset in presets("sensors"))
+    camera = with_preset(project, CAMERA, open_, focus=0.403).scene.camera
+    assert camera.lens.focus_distance == 0.403
+    assert camera.focal_length == pytest.approx(0.025)
+    assert camera.fx * 3.45e-6 == pytest.approx(1.0 / (1.0 / 0.025 - 1.0 / 0.403))
+    assert with_preset(project, CAMERA, stated, focus=0.403).scene.camera.lens.focus_distance == 1.0
+    too_near = with_preset(project, CAMERA, open_, focus=0.03).scene.camera
+    assert too_near.lens.focus_distance is None and too_near.focal_length == pytest.approx(0.025)
 
 
 def test_a_preset_is_one_undoable_edit(project: Project) -> None:

@@ -17,7 +17,11 @@ from render.laser.laser import Waist
 from render.material.material import Texture
 from render.scene.motion import LinearStage
 from render.scene.shape import MeshFile
+from studio.editing.placement import working_distance
+from studio.preview.estimates import BLURRED_PX
+from studio.preview.readouts import readouts
 from studio.project.calibration import CalibratedCamera, Calibration
+from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.qt.scene import mesh_importer
 from studio.qt.scene.inspector import Inspector
@@ -215,6 +219,33 @@ class TestMenus:
         assert "Typical" in told[-1]
         session.document.undo()
         assert session.project == before
+
+    def test_a_lens_preset_is_focused_on_the_line_that_it_sees(
+        self, qtbot: QtBot, session: Session, inspector: Inspector
+    ) -> None:
+        """Focused far away it blurred the line over 40 px."""
+        qtbot.waitUntil(lambda: not live(session).is_loading)
+        session.select(CAMERA)
+        before, told = session.project, []
+        session.message.connect(lambda level, text: told.append(text))
+        action = next(entry for entry in inspector.presets.menu().actions() if "12 mega" in entry.text())
+        action.trigger()
+        live(session).refresh()
+        found = readouts(live(session).look, 0)
+        lens = session.project.scene.camera.lens
+        assert found.distance is not None and lens.focus_distance is not None and found.blur_px is not None
+        assert found.distance.low < lens.focus_distance < found.distance.high
+        assert found.blur_px.high < BLURRED_PX
+        assert session.project.scene.camera.focal_length == pytest.approx(0.025)
+        assert f"focused at {1e3 * lens.focus_distance:.4g} mm. " in told[-1]
+        session.document.undo()
+        assert session.project == before
+        # without a line, where the laser's sheet meets the camera's axis
+        for i in range(len(before.scene.objects)):
+            session.set(("scene", "objects", i, "visible"), False)
+        action.trigger()
+        meets = working_distance(before.scene)
+        assert session.project.scene.camera.lens.focus_distance == pytest.approx(meets, rel=1e-3)
 
     def test_a_preset_that_is_refused_is_told_as_such_with_the_way_out(
         self, session: Session, inspector: Inspector
