@@ -1,8 +1,9 @@
-"""What a study will take before it runs: cells, renders, processor time and disk."""
+"""What a study will take before it runs: cells, renders, time and disk."""
 
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,14 +16,14 @@ from studio.study.cells import Cell, cells_at, check_size, lattice_of, methods_o
 from studio.study.small_images import small_image_doubts
 from studio.study.store import Row
 from studio.study.study import SEARCHES, Study
-from studio.study.tables import CALIBRATING, SECONDS, measured_cells
+from studio.study.tables import CALIBRATING, LOAD, SECONDS, measured_cells
 from studio.study.tasks import tasks
 
 A_COLUMN = 5
 """Cells of a boundary's column, about."""
 
 Costs = tuple[float, float]
-"""Processor seconds of a render, and of developing and measuring one cell of it."""
+"""Seconds that a worker takes for a render, and for developing and measuring one cell of it."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Estimate:
     searched: int
     """Cells that the searches may ask for beside those."""
     seconds: float | None
-    """Of one processor; None: no cell of some sweep was timed yet."""
+    """Of one worker; None: no cell of some sweep was timed yet."""
     bytes: int
     """Of the whole folder in the end."""
     steps: int = 1
@@ -43,6 +44,12 @@ class Estimate:
     """What figures at its image scale are worth."""
     left_over: int = 0
     """Cells of the folder with values that are no longer asked for."""
+    start_up: float = 0.0
+    """s until the workers begin, whatever there is to do."""
+
+    def wall(self, workers: int) -> float | None:
+        """s from the run's begin to its end, on so many workers."""
+        return None if self.seconds is None else self.start_up + self.seconds / workers
 
 
 def estimate(
@@ -103,20 +110,29 @@ def costs(study: Study, bases: Mapping[str, Project], number: int) -> Costs:
     warm_up(cells[0].project)
     # a second time, as the first one loads what each method takes
     (task,) = tasks([*cells, *cells], study.image_scale, study.laser)
+    began, busy = time.monotonic(), time.process_time()
     found = [_split({**dict.fromkeys(SECONDS, 0.0), **seconds}) for _, _, seconds in measure_task(task)]
-    render, measure = np.mean(found[len(cells) :], axis=0)
+    load = (time.monotonic() - began) / max(time.process_time() - busy, 1e-9)
+    render, measure = max(load, 1.0) * np.mean(found[len(cells) :], axis=0)
     return float(render), float(measure)
 
 
 def _known(study: Study, number: int, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> Costs | None:
-    """By the cells of the sweep that are measured: the median of each method, as methods differ by far."""
+    """By the cells of the sweep that are measured: the median of each method, as methods differ by far.
+
+    On a machine as busy with others as it was then.
+    """
     found: dict[str, list[Costs]] = {}
+    loads: list[float] = []
     for cell, row in measured_cells(study, number, bases, rows):
         if SECONDS[-1] in row:
             found.setdefault(cell.method, []).append(_split(row))
+            loads.append(row.get(LOAD, 1.0))
     if not found:
         return None
-    render, measure = np.mean([np.median(one, axis=0) for one in found.values()], axis=0)
+    # less than 1: the render was there already
+    load = max(float(np.median(loads)), 1.0)
+    render, measure = load * np.mean([np.median(one, axis=0) for one in found.values()], axis=0)
     return float(render), float(measure)
 
 

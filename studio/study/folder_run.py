@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from render.base.errors import InputError
+from render.base.threads import thread_count
 from studio.project.project import Project
 from studio.runtime.console import StageProgress
 from studio.runtime.workers import EVERY_PROCESSOR, Engine
@@ -16,6 +17,7 @@ from studio.study.answers import Answer, answers
 from studio.study.as_begun import begun_in, set_apart
 from studio.study.begin import begin
 from studio.study.cells import Cell, cells_at, row_of
+from studio.study.start_up import remember
 from studio.study.store import Row, Store, described
 from studio.study.study import Study
 from studio.study.tables import values_of, write_tables
@@ -92,6 +94,11 @@ def run_into(
                 spent = time.monotonic() - now
                 next_look = now + spent / SHARE
 
+        def begun(at: float) -> None:
+            started(at - called)
+            if engine.scheduler is None:
+                remember(thread_count(engine.workers), at - called)
+
         try:
             run_study(
                 study,
@@ -100,7 +107,7 @@ def run_into(
                 engine=engine,
                 progress=tell,
                 cancelled=cancelled,
-                begun=lambda at: started(at - called),
+                begun=begun,
             )
         finally:
             found = found_in(study, bases, store.rows())

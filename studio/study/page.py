@@ -168,7 +168,7 @@ def columns(answer: Answer) -> list[str]:
     """Headings of `table`, after those of the fields and the method."""
     measure = measure_of(answer.sweep.measure)
     unit = f" ({measure.unit})" if measure.unit else ""
-    columns = [f"{measure.label}{unit}", "95 % interval", "repeats", "time (s)", "time in rays (million)"]
+    columns = [f"{measure.label}{unit}", "95 % interval", "repeats", "processor time (s)", "time in rays (million)"]
     return [*columns, "on the front"] if answer.front is not None else columns
 
 

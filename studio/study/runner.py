@@ -16,6 +16,7 @@ from studio.study.cells import WHOLE, Cell, Shard, methods_of, next_cells
 from studio.study.searching import Searching
 from studio.study.store import Store
 from studio.study.study import SEARCHES, Study
+from studio.study.tables import LOAD, task_seconds
 from studio.study.tasks import Task, tasks
 
 Progress = Callable[[int, int], None]
@@ -82,7 +83,10 @@ def _measure(task: Task, cancelled: Cancel) -> Any:
 
     start = time.monotonic()
     found = measure_task(task, cancelled)
-    return time.monotonic() - start, found
+    taken = time.monotonic() - start
+    processor = task_seconds([seconds for _, _, seconds in found])
+    load = {LOAD: taken / processor} if processor > 0.0 else {}
+    return taken, [(key, row, {**seconds, **load}) for key, row, seconds in found]
 
 
 def _warm_up(text: str, folder: str, methods: tuple[Method, ...]) -> None:

@@ -6,7 +6,7 @@ The table holds what seeds decide and is the same to the bit on every run; secon
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,8 @@ from studio.study.study import SEARCHES, Study
 CALIBRATING = "seconds_calibrate"
 """Of a row whose cell calibrates; no part of its frame."""
 SECONDS = ("seconds_render", "seconds_develop", "seconds_extract")
+LOAD = "load"
+"""Of a row: seconds that its task took over those of a processor: more than 1 where the machine had others to serve."""
 RAY_UNITS = "ray_units"
 """Of times.csv: million rays that the machine could have traced in the frame's seconds."""
 
@@ -117,6 +119,12 @@ def seconds_of(rows: list[Row], time: str) -> np.ndarray:
     """(repeats,) processor seconds: of the whole "frame", of finding the "line", or of the "calibration"."""
     parts = {"frame": SECONDS, "line": SECONDS[-1:], "calibration": (CALIBRATING,)}[time]
     return np.array([sum(row.get(part, math.nan) for part in parts) for row in rows])
+
+
+def task_seconds(rows: Sequence[Mapping[str, float]]) -> float:
+    """Processor seconds of the cells of one render."""
+    each = [sum(row.get(part, 0.0) for part in (*SECONDS[1:], CALIBRATING)) for row in rows]
+    return max((row.get(SECONDS[0], 0.0) for row in rows), default=0.0) + sum(each)
 
 
 def rays_of(rows: list[Row], time: str) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from render.base.errors import InputError
@@ -13,6 +13,7 @@ from studio.runtime.jobs import Progress
 from studio.runtime.workers import Engine
 from studio.study.estimate import Costs, Estimate, costs, estimate
 from studio.study.folder_run import Found, in_window, opened
+from studio.study.start_up import foretold
 from studio.study.store import Row
 from studio.study.study import Study
 
@@ -26,9 +27,18 @@ class Ended:
 
 
 def estimating(
-    study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row], known: dict[str, Costs], *, timed: bool
+    study: Study,
+    bases: Mapping[str, Project],
+    rows: Mapping[str, Row],
+    known: dict[str, Costs],
+    workers: int,
+    *,
+    timed: bool,
 ) -> Callable[[Progress, Cancel], Estimate | str]:
-    """known: costs by sweep, to which those that are measured are added, where `timed` asks for them."""
+    """known: costs by sweep, to which those that are measured are added, where `timed` asks for them.
+
+    workers: that a run starts.
+    """
 
     def work(progress: Progress, cancelled: Cancel) -> Estimate | str:
         try:
@@ -36,7 +46,7 @@ def estimating(
                 if not cancelled():
                     progress(f"timing {sweep.name}", number / len(study.sweeps))
                     known[sweep.name] = costs(study, bases, number)
-            return estimate(study, bases, rows, known)
+            return replace(estimate(study, bases, rows, known), start_up=foretold(workers))
         except InputError as error:
             return in_window(error)
 

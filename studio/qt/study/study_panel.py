@@ -304,8 +304,9 @@ def estimate_text(told: Estimate, processors: int) -> str:
         parts.append(f"step 1 of {told.steps} alone")
     if told.searched:
         parts.append(f"up to {told.searched} more that the search asks for")
-    if told.seconds is not None:
-        parts.append(f"about {duration(told.seconds / processors)} on {processors} processors")
+    if (seconds := told.wall(processors)) is not None:
+        start = f" ({duration(told.start_up)} of it until they start)" if told.start_up >= 1.0 else ""
+        parts.append(f"about {duration(seconds)} on {processors} processors{start}")
     parts.append(f"{told.bytes / 1e6:.1f} MB")
     return "\n".join([", ".join(parts), *notes])
 

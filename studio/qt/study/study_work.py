@@ -239,9 +239,8 @@ class StudyWork(LongWork):
             self.estimate = told if isinstance(told, Estimate) else None
             self._tell(told if isinstance(told, str) else "")
 
-        self.unseen.run(
-            "estimate", "estimate", estimating(study, bases, rows, known, timed=timed), then, interrupt=True
-        )
+        work = estimating(study, bases, rows, known, self.processors, timed=timed)
+        self.unseen.run("estimate", "estimate", work, then, interrupt=True)
 
     # the run
 
@@ -259,8 +258,7 @@ class StudyWork(LongWork):
         work = running(run_into, self.folder, study, bases, self.engine, grew, self._take_start)
         self._fail("")
         self._run_bases = bases
-        seconds = self.estimate.seconds if self.estimate is not None else None
-        self.promised = None if seconds is None else seconds / self.processors
+        self.promised = self.estimate.wall(self.processors) if self.estimate is not None else None
         self._begin(work, self._take_end)
 
     def choose_folder(self, folder: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pytestqt.qtbot import QtBot
@@ -108,6 +109,20 @@ def test_measured_cells_that_drop_out_are_told_beside_those_to_come() -> None:
     assert second == "8 measured cells are of values that are no longer asked for (they stay in the folder)."
     assert "1 measured cell is of values" in estimate_text(Estimate(0, 0, 0, 0.0, 0, left_over=1), 2)
     assert estimate_text(Estimate(0, 0, 0, 0.0, 0), 2) == "Every cell is measured."
+
+
+def test_the_start_of_the_workers_is_told_with_the_time(panel: StudyPanel, qtbot: QtBot, monkeypatch: Any) -> None:
+    """10 s were told of ten cells whose workers alone took 45 s to start."""
+    told = estimate_text(Estimate(10, 10, 0, 20.0, 0, start_up=45.0), 2)
+    assert told == "10 cells of 10 renders to go, about 55 s on 2 processors (45 s of it until they start), 0.0 MB"
+    assert "until they start" not in estimate_text(Estimate(10, 10, 0, 20.0, 0), 2)
+    monkeypatch.setattr("studio.qt.study.study_jobs.foretold", lambda workers: 7.0 + workers)
+    panel.work.look_ahead()
+    qtbot.waitUntil(lambda: panel.work.estimate is not None and panel.work.estimate.start_up > 0.0)
+    assert panel.work.estimate is not None
+    qtbot.waitUntil(
+        lambda: panel.work.estimate is not None and panel.work.estimate.start_up == 7.0 + panel.work.processors
+    )
 
 
 def test_no_sentence_widens_the_panel(panel: StudyPanel, qtbot: QtBot) -> None:
