@@ -27,6 +27,7 @@ from studio.qt.core.live_preview import live
 from studio.qt.core.render import Render
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import flush, upper_and_lower
+from studio.qt.image.badge_text import badge_text
 from studio.qt.image.image_item import PictureView
 from studio.qt.image.line_overlay import BOX_PX, LineOverlay, swatch
 from studio.qt.image.picture_clicks import PictureClicks
@@ -48,7 +49,6 @@ LEAST_HEIGHT = 260
 """px, from which names of lines may have a row of their own."""
 SATURATED_NAME = "Saturated"
 LIVE = "Live estimate"
-OF_A_CELL = "Not of the project: the picture is of a study's cell, with values of its own."
 
 
 class CameraView(QWidget):
@@ -160,7 +160,7 @@ class CameraView(QWidget):
         session.measured.connect(self._draw_overlay)
         session.hover_changed.connect(self._hover_changed)
         session.selection_changed.connect(self._follow_selection)
-        session.document_replaced.connect(lambda: self._read_out(None))
+        session.document_replaced.connect(self._start_anew)
         self.live.changed.connect(self._live_changed)
         self.live.loading.connect(lambda on: self._show_badge())
         self.choice.activated.connect(self._choose)
@@ -180,6 +180,11 @@ class CameraView(QWidget):
             self.badge.setStyleSheet(f"QFrame, QLabel {{ background: {ground}; }}")
 
     # what is shown
+
+    def _start_anew(self) -> None:
+        """What is looked at in one project is no place in another."""
+        self._fitted = False
+        self._read_out(None)
 
     def _renders_changed(self) -> None:
         shown = self.session.shown
@@ -252,24 +257,7 @@ class CameraView(QWidget):
 
     def _show_badge(self) -> None:
         shown = self.session.shown
-        if shown is None and not self.live.ready:
-            text = "Preparing the live estimate; the very first time this takes half a minute."
-        elif shown is None:
-            text = "Live estimate: one ray a pixel, no noise. Render for the real image."
-        elif self.session.stale:
-            text = (
-                "Live estimate: the scene has changed since the render." if self.is_live else "The scene has changed."
-            )
-        elif self.is_live:
-            text = "Live estimate: one ray a pixel, no noise."
-        elif shown.cell:
-            text = f"{OF_A_CELL} {shown.name}"
-        elif not shown.final:
-            text = "Still refining." if self.session.dragging else ""
-        else:
-            text = ""
-        if self.is_live and self.session.problems and self.live.ready:
-            text = "Live estimate, but not of the scene as it is set: the scene tree marks what cannot be."
+        text = badge_text(self.session, self.is_live, self.live.ready)
         self._colour_badge()
         self.badge_text.setText(text)
         self.render_button.setVisible(shown is None or self.session.stale)
@@ -321,7 +309,7 @@ class CameraView(QWidget):
         self.runner.run("picture", "drawing", work, then)
 
     def _place(self, levels: list[Picture], size: tuple[int, int]) -> None:
-        """Put a picture up; the part that is seen stays the same when its size in pixels changes."""
+        """Put a picture up; the part that is seen stays the same when its scale changes."""
         before = self._size
         self.view.item.set_levels(levels, size)
         self._size = size

@@ -7,7 +7,7 @@ from typing import Any
 
 import pyqtgraph as pg
 from PySide6.QtCore import QLineF, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QImage, QPainter, QPen, QResizeEvent
+from PySide6.QtGui import QColor, QImage, QKeySequence, QPainter, QPen, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QStyleOptionGraphicsItem, QWidget
 
 from render.output.tone_mapping import Picture
@@ -117,7 +117,7 @@ class PictureBox(pg.ViewBox):  # type: ignore[misc]
 
 
 class PictureView(pg.GraphicsView):  # type: ignore[misc]
-    """A view box in pixel coordinates, v downwards: wheel zooms at the cursor, drag pans."""
+    """A view box in pixel coordinates, v downwards: wheel zooms at the cursor, drag pans, F shows the whole picture."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -127,6 +127,7 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         self.box.addItem(self.item)
         self.setBackground(self.palette().color(self.backgroundRole()))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        QShortcut(QKeySequence("F"), self, self.fit, context=Qt.ShortcutContext.WidgetWithChildrenShortcut)
 
     def resizeEvent(self, event: QResizeEvent | None) -> None:
         fitted = hasattr(self, "item") and self._is_fitted(*self.item.size)
@@ -157,8 +158,8 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         return self.box.width() / width if width > 0 else 1.0
 
     def keep_place(self, before: tuple[int, int], now: tuple[int, int]) -> None:
-        """Show the same part of a picture whose size in pixels has changed."""
-        if self._is_fitted(*before):
+        """Show the same part of a picture whose size in pixels has changed; all of one of another shape."""
+        if self._is_fitted(*before) or not _alike(before, now):
             self.fit()
             return
         sx, sy = now[0] / before[0], now[1] / before[1]
@@ -167,3 +168,8 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
             QRectF((rect.x() + 0.5) * sx - 0.5, (rect.y() + 0.5) * sy - 0.5, rect.width() * sx, rect.height() * sy),
             padding=0.0,
         )
+
+
+def _alike(before: tuple[int, int], now: tuple[int, int]) -> bool:
+    """One is the other at another scale, but for the rounding of its sides."""
+    return abs(before[0] * now[1] - now[0] * before[1]) <= 0.5 * (sum(before) + sum(now))

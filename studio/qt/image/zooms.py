@@ -1,4 +1,4 @@
-"""How large a picture is shown: two buttons, one with a menu where there is no room for two, and the picture's menu."""
+"""How large a picture is shown: two buttons, one with the other in its menu where there is little room, and a menu."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Zooms(QWidget):
         self.buttons: list[QToolButton] = []
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
-        fit = "Fit", "The whole image (F)", view.fit
+        fit = "Fit", "The whole image (F in it)", view.fit
         one_to_one = "1:1", "One screen pixel a pixel", view.one_to_one
         for text, tip, act in (fit, one_to_one):
             action = QAction(text, self)
@@ -32,10 +32,11 @@ class Zooms(QWidget):
             self.buttons.append(button)
             row.addWidget(button)
         self.more = QToolButton()
-        self.more.setText("…")
-        self.more.setToolTip("Fit, 1:1: also by a right click into the picture")
+        self.more.setText("Fit")
+        self.more.setToolTip("The whole image (F in it); 1:1 by the arrow, or by a right click into the picture")
         self.more.setMenu(self.menu)
-        self.more.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.more.setPopupMode(QToolButton.ToolButtonPopupMode.MenuButtonPopup)
+        self.more.clicked.connect(view.fit)
         row.addWidget(self.more)
         self.setMinimumWidth(self.more.sizeHint().width())  # two buttons must not widen a window that has no room
         self.spread(True)

@@ -9,11 +9,12 @@ from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QApplication
 
 from analysis.line.result import Flag
+from studio.project.document import Document
 from studio.qt.core.live_preview import live
 from studio.qt.core.render import Render
 from studio.qt.image.camera_view import CameraView
 from studio.qt.image.row_profile import REASONS, fitted_profile
-from tests.studio.qt.small_session import measured_view, small_project, small_render, small_session
+from tests.studio.qt.small_session import FOLDER, measured_view, small_project, small_render, small_session
 
 
 @pytest.fixture
@@ -271,6 +272,49 @@ def test_keeping_the_place_when_the_size_changes(qtbot, made):
     after = view.box.viewRect()
     assert after.left() + 0.5 == pytest.approx(2 * (before.left() + 0.5), abs=0.5)
     assert after.width() == pytest.approx(2 * before.width(), rel=1e-6)
+
+
+def test_the_picture_is_whole_again_for_another_sensor_and_another_project(qtbot, unrendered):
+    """Dragged aside once it stayed so, or a small part of it, over projects of other sensors."""
+    view, session = unrendered.view, unrendered.session
+
+    def zoom_away():
+        qtbot.waitUntil(lambda: view.item.size == unrendered._size != (0, 0))
+        view.box.setRange(xRange=(-900.0, 100.0), yRange=(-900.0, 100.0), padding=0)
+
+    def whole():
+        return view._is_fitted(*view.item.size)
+
+    camera = session.project.scene.camera
+    zoom_away()
+    place = view.box.viewRect()
+    session.set(("sensor", "exposure_time"), 2e-3)
+    live(session).refresh()
+    assert view.box.viewRect() == place, "the same sensor, another picture"
+    for scale in (2, 1):
+        bigger = {"width": scale * camera.width, "height": scale * camera.height}
+        session.set(("scene", "rig", "camera"), camera.model_copy(update=bigger))
+        live(session).refresh()
+        assert view.item.size == (scale * camera.width, scale * camera.height) and not whole()
+    session.set(("scene", "rig", "camera"), camera.model_copy(update={"width": 2 * camera.width}))
+    live(session).refresh()
+    assert whole()
+    zoom_away()
+    session.replace_document(Document(small_project(), root=FOLDER))
+    qtbot.waitUntil(lambda: view.item.size == (camera.width, camera.height) and whole())
+
+
+def test_the_narrow_views_button_fits_and_so_does_a_key_in_the_picture(qtbot, made):
+    made.resize(400, 500)
+    qtbot.waitUntil(made.zooms.more.isVisible)
+    assert made.zooms.more.text() == "Fit"
+    with qtbot.waitActive(made):
+        made.activateWindow()
+    made.view.setFocus()
+    for fit in (made.zooms.more.click, lambda: qtbot.keyClick(made.view, Qt.Key.Key_F)):
+        made.view.box.setRange(xRange=(-900.0, 100.0), yRange=(-900.0, 100.0), padding=0)
+        fit()
+        qtbot.waitUntil(lambda: made.view._is_fitted(*made.view.item.size))
 
 
 def test_what_is_fitted_stays_fitted_until_a_person_zooms(qtbot, made):
