@@ -59,6 +59,14 @@ def keep_room(label: QLabel, lines: int) -> None:
     label.setSizePolicy(policy)
 
 
+def no_higher(*widgets: QWidget) -> None:
+    """Than they need: what room is left is another's."""
+    for widget in widgets:
+        policy = widget.sizePolicy()
+        policy.setVerticalPolicy(QSizePolicy.Policy.Maximum)
+        widget.setSizePolicy(policy)
+
+
 def text_button(text: str, tip: str = "", name: str = "") -> QPushButton:
     """name: for the style sheet."""
     button = QPushButton(text)

@@ -60,12 +60,14 @@ class ReadOnlyTable(QTableWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        self._ends = False
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ContiguousSelection)
         self.setShowGrid(False)
         self.setAlternatingRowColors(True)
         self.verticalHeader().setDefaultSectionSize(ROW_PX)
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self.horizontalScrollBar().rangeChanged.connect(self._bar_changed)
 
     def show_methods(self, methods: list[str], count: int) -> None:
         """A column for each of them, and so many rows."""
@@ -79,9 +81,16 @@ class ReadOnlyTable(QTableWidget):
         self.setItem(row, column, item)
         return item
 
+    def _bar_changed(self) -> None:
+        if self._ends:
+            self.end_with_rows()
+
     def end_with_rows(self) -> None:
-        """No higher than its rows."""
-        rows = ROW_PX * self.rowCount()
+        """No higher than its rows, with the bar below them where they are too wide."""
+        self._ends = True
+        bar = self.horizontalScrollBar()
+        across = bar.sizeHint().height() if bar.maximum() > bar.minimum() else 0
+        rows = ROW_PX * self.rowCount() + across
         self.setMaximumHeight(self.horizontalHeader().sizeHint().height() + rows + 2 * self.frameWidth())
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
@@ -30,7 +29,7 @@ from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.session import Session
-from studio.qt.core.widgets import keep_room, text_button
+from studio.qt.core.widgets import keep_room, no_higher, text_button
 from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.part_drawing import PartDrawing
 from studio.qt.results.part_editor import PartEditor
@@ -362,7 +361,7 @@ class PartTab(QWidget):
         for kind, title in TITLES.items():
             asked = menu.addAction(title)
             asked.setToolTip(DEFINITIONS.get(kind, ""))
-            asked.triggered.connect(partial(self._start_asked, kind))
+            asked.triggered.connect(lambda _checked, kind=kind: self.start(kind))
         self.add.setMenu(menu)
         self.table.setColumnCount(len(HEADINGS))
         self.table.setHorizontalHeaderLabels(list(HEADINGS))
@@ -385,9 +384,8 @@ class PartTab(QWidget):
         column.addWidget(self.told)
         column.addWidget(self.table, 1)
         column.addWidget(self.editor)
-
-    def _start_asked(self, kind: Kind, _checked: bool = False) -> None:
-        self.start(kind)
+        column.addStretch(0)  # room that no row needs is below all, and not between
+        no_higher(self.told, self.editor)
 
 
 def _free_name(kind: Kind, taken: tuple[Gauge, ...]) -> str:
