@@ -6,7 +6,6 @@ Of a scan they are of the step that is looked at; the measures and the histogram
 from __future__ import annotations
 
 from functools import partial
-from html import escape
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QCloseEvent, QResizeEvent
@@ -32,6 +31,7 @@ from studio.qt.core.icons import dot
 from studio.qt.core.laser_box import LaserBox
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session, one_of
+from studio.qt.results.head_banner import HeadBanner
 from studio.qt.results.heads import heads, measured_otherwise
 from studio.qt.results.measures_table import MeasuresTable
 from studio.qt.results.nothing_yet import NothingYet
@@ -95,9 +95,8 @@ class ResultsPanel(QWidget):
         self.part = PartTab(session, self.profile, self.scan_bar)
         self.region = RegionTab(session, self.rows, self.profile, self.scan_bar)
         self.scan_steps = scan_steps(session)
-        self.head = QFrame()
-        self.head_text = QLabel(wordWrap=True)
-        self.head_text.setMinimumWidth(1)
+        self.head = HeadBanner()
+        self.head_text = self.head.text
         self.notices = Remarks(), Remarks()
         """What a reader should notice: below the measures, and in a tab where there is no room below them."""
         self._lay_out()
@@ -231,10 +230,7 @@ class ResultsPanel(QWidget):
             notice.show_texts(remarks)
 
     def _tell_head(self) -> None:
-        told = heads(self.session, self.scan_steps.problem)
-        self.head_text.setText("   ".join(told))
-        self.head_text.setToolTip("".join(f"<p>{escape(text)}</p>" for text in told))
-        self.head.setVisible(bool(told))
+        self.head.tell(heads(self.session, self.scan_steps.problem))
 
     def _project_changed(self) -> None:
         if self.session.project.measured_in != self.profile.section:
@@ -342,9 +338,7 @@ class ResultsPanel(QWidget):
     def _repaint(self) -> None:
         for plot in (self.rows, self.profile, self.histogram, self.by_step):
             plot.repaint_theme()
-        colours = theme.colours()
-        ground = theme.mixed(colours.warning, colours.window, 0.3)
-        self.head.setStyleSheet(f"QFrame, QLabel {{ background: {ground}; }}")
+        self.head.repaint_theme()
         self.refresh()
 
     def _lay_out(self) -> None:
@@ -386,9 +380,6 @@ class ResultsPanel(QWidget):
         content = QWidget()
         inside = QVBoxLayout(content)
         inside.setContentsMargins(8, 6, 8, 8)
-        head = QVBoxLayout(self.head)
-        head.setContentsMargins(8, 3, 8, 3)
-        head.addWidget(self.head_text)
         top = QHBoxLayout()
         top.addWidget(self.scan_bar, 1)
         top.addWidget(self.head, 1)
