@@ -111,15 +111,7 @@ def rows(r: Readouts) -> tuple[Row, ...]:
         _focus(r),
         _sigma(r),
         *_calibration(r),
-        Row(
-            "occluded",
-            "Occluded",
-            NOTHING if r.occluded is None else f"{r.occluded:.0%}",
-            f"{r.scan_lines_hit} of {r.scan_lines} lines",
-            "" if r.occluded is None or r.occluded < 0.1 else "warning" if r.occluded < 0.4 else "error",
-            "Share of the lit line within the image that the camera cannot see because something stands before it, "
-            "or it lies on a side that faces away.",
-        ),
+        _occlusion(r),
     )
 
 
@@ -256,6 +248,19 @@ def _sigma(r: Readouts) -> Row:
     help += f" Here: {photon} µm from photons, {speckle} µm from speckle."
     note = f"speckle {speckle}" if r.speckle_sigma > r.photon_sigma else f"photons {photon}"
     return Row("sigma", "Depth noise, sigma", f"{micrometres(r.speckled_sigma)} µm", _both(supposed, note), level, help)
+
+
+def _occlusion(r: Readouts) -> Row:
+    help = (
+        "Share of the lit line within the image that the camera cannot see because something stands before it, or it "
+        "lies on a side that faces away."
+    )
+    note = f"{r.scan_lines_hit} of {r.scan_lines} lines"
+    # where no scan line has the line and nothing hides it there is none to be seen
+    if r.occluded is None or (r.occluded == 0.0 and not r.scan_lines_hit):
+        return Row("occluded", "Occluded", NOTHING, note, "", help)
+    level: Level = "" if r.occluded < 0.1 else "warning" if r.occluded < 0.4 else "error"
+    return Row("occluded", "Occluded", f"{r.occluded:.0%}", note, level, help)
 
 
 def _calibration(r: Readouts) -> list[Row]:
