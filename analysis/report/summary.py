@@ -7,7 +7,7 @@ import numpy as np
 from analysis.report.colour import method_name
 from analysis.report.model import ReportInput
 from analysis.report.total import NARROW_PX, Total, total
-from analysis.report.units import count, counted, micrometres, percent, pixels
+from analysis.report.units import count, counted, grouped, micrometres, percent, pixels
 
 ENOUGH = 30
 """Least number of points from which a conclusion is drawn."""
@@ -142,7 +142,7 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
     if found.calibration > 0.0 and off > allowed:
         said.append(
             f"Points were made with a calibration that does not hold here: half of them are off by "
-            f"{micrometres(off)} in depth or more, {off / found.calibration:,.0f} times what it tells of itself "
+            f"{micrometres(off)} in depth or more, {grouped(off / found.calibration)} times what it tells of itself "
             f"({micrometres(found.calibration)}, one sigma). It was made before the camera, its lens or the laser was "
             "changed, or of another scanner: calibrate again, or take it out of the project."
         )

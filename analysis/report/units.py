@@ -79,11 +79,14 @@ def percent(value: float, decimals: int = 1) -> str:
     return f"{shown:.{decimals}f}\u00a0%"
 
 
+def grouped(value: float, decimals: int = 0) -> str:
+    """Thousands set apart by thin spaces, as a comma may be a decimal one: "1 820.5"."""
+    return f"{value:,.{decimals}f}".replace(",", "\u2009")
+
+
 def count(value: float) -> str:
-    """Thousands set apart by thin spaces: "1 820"; from 10 million on "191 million"."""
-    if value >= 1e7:
-        return f"{value / 1e6:,.0f}\u00a0million".replace(",", "\u2009")
-    return f"{value:,.0f}".replace(",", "\u2009")
+    """ "1 820"; from 10 million on "191 million"."""
+    return f"{grouped(value / 1e6)}\u00a0million" if value >= 1e7 else grouped(value)
 
 
 def counted(number: float, noun: str) -> str:

@@ -22,9 +22,9 @@ def check_placement(world: World, scene: Scene, step: int = 0) -> None:
         raise InputError(
             "the scene has no visible object",
             where="scene.objects",
-            found=f"{len(scene.objects)} objects, none visible",
+            found=f"{len(scene.objects)} hidden" if scene.objects else "none",
             allowed="at least one visible object",
-            cure="add an object or set visible to true",
+            cure="add an object, or make one visible",
         )
     for i, laser in enumerate(scene.lasers):
         distance = abs(float(scene.laser_plane(i)[3]))

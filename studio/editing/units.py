@@ -7,6 +7,7 @@ import math
 import re
 from dataclasses import dataclass
 
+from analysis.report.units import grouped
 from render.base.errors import InputError
 from studio.editing.arithmetic import evaluate
 
@@ -31,6 +32,8 @@ def show_lengths_in(unit: str) -> None:
 
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+_THIN = re.compile(r"(?<=\d)[\u2009\u202f](?=\d{3})")
+"""Between thousands, of a number that was copied from where it is told."""
 _OPERATION = re.compile(r"[-+*(]|/\s*[\d.,(]")
 """A unit may hold a slash as well, before a letter."""
 
@@ -63,10 +66,12 @@ class Unit:
         return "0" if measured and abs(shown) < 1e-6 else plain(shown, 4 if measured else 6)
 
     def with_unit(self, value: float) -> str:
-        return f"{self.format(value)} {self.shown}".rstrip()
+        """As a person is told it, thousands set apart."""
+        return f"{_grouped(self.format(value))} {self.shown}".rstrip()
 
     def parse(self, text: str) -> float:
         """The stored value of what was typed: "12", "0.4 m", "1,5", "150+25". InputError: no number, no such unit."""
+        text = _THIN.sub("", text)
         match = _NUMBER.fullmatch(text)
         if match is None or _OPERATION.search(match[2]):
             units = {self.shown: 1.0 / self.factor, **FACTORS.get(self.stored, {})}
@@ -86,6 +91,11 @@ class Unit:
         if not (math.isfinite(stored) and math.isfinite(stored * self.factor)):
             raise InputError("the number is too large", found=text.strip())
         return stored
+
+
+def _grouped(text: str) -> str:
+    whole, point, rest = text.partition(".")
+    return f"{grouped(int(whole))}{point}{rest}" if whole.lstrip("-").isdigit() and whole != "-0" else text
 
 
 def plain(value: float, decimals: int) -> str:

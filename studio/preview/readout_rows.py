@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from analysis.report.units import grouped
 from studio.editing.units import Unit
 from studio.preview.estimates import BLURRED_PX, SHARP_PX
 from studio.preview.inspection import DIM_ELECTRONS, NARROW_PX, WIDE_PX
@@ -113,15 +114,7 @@ def rows(r: Readouts) -> tuple[Row, ...]:
         _focus(r),
         _sigma(r),
         *_calibration(r),
-        Row(
-            "occluded",
-            "Occluded",
-            NOTHING if r.occluded is None else f"{r.occluded:.0%}",
-            f"{r.scan_lines_hit} of {r.scan_lines} lines",
-            "" if r.occluded is None or r.occluded < 0.1 else "warning" if r.occluded < 0.4 else "error",
-            "Share of the lit line within the image that the camera cannot see because something stands before it, "
-            "or it lies on a side that faces away.",
-        ),
+        _occlusion(r),
     )
 
 
@@ -190,17 +183,17 @@ def _peak(r: Readouts) -> Row:
     if r.peak_electrons is None or r.laser_electrons is None or r.ambient_electrons is None or r.detected is None:
         return Row("peak", PEAK, NOTHING, "", "", help)
     middle, low, high = r.peak_electrons.middle, r.peak_electrons.low, r.peak_electrons.high
-    help += f" Along the line {low:,.0f} to {high:,.0f} e-. Full well: {r.full_well:,.0f} e-."
+    help += f" Along the line {grouped(low)} to {grouped(high)} e-. Full well: {grouped(r.full_well)} e-."
     help += (
-        f" Ambient light and dark current give {r.ambient_electrons:,.0f} e- of it, "
-        f"the laser {r.laser_electrons:,.0f} e-: to the detection {r.detected:.1f} times the least that counts as a "
-        f"line. Below 1 it is lost in the noise, below {MEASURED:g} it is often detected and not measured. "
+        f" Ambient light and dark current give {grouped(r.ambient_electrons)} e- of it, "
+        f"the laser {grouped(r.laser_electrons)} e-: to the detection {r.detected:.1f} times the least that counts as "
+        f"a line. Below 1 it is lost in the noise, below {MEASURED:g} it is often detected and not measured. "
         "Each is the median along the line, so that two need not add up to the third."
     )
     faint = r.detected < MEASURED or r.laser_electrons < DIM_ELECTRONS
     level: Level = "error" if r.detected < 1.0 else "warning" if faint else ""
-    note = f"laser {r.laser_electrons:,.0f} over {r.ambient_electrons:,.0f}"
-    return Row("peak", PEAK, f"{middle:,.0f} e-", note, level, help)
+    note = f"laser {grouped(r.laser_electrons)} over {grouped(r.ambient_electrons)}"
+    return Row("peak", PEAK, f"{grouped(middle)} e-", note, level, help)
 
 
 def _saturation(r: Readouts) -> Row:
@@ -262,6 +255,19 @@ def _sigma(r: Readouts) -> Row:
     return Row("sigma", "Depth noise, sigma", f"{micrometres(r.speckled_sigma)} µm", _both(supposed, note), level, help)
 
 
+def _occlusion(r: Readouts) -> Row:
+    help = (
+        "Share of the lit line within the image that the camera cannot see because something stands before it, or it "
+        "lies on a side that faces away."
+    )
+    note = f"{grouped(r.scan_lines_hit)} of {grouped(r.scan_lines)} lines"
+    # where no scan line has the line and nothing hides it there is none to be seen
+    if r.occluded is None or (r.occluded == 0.0 and not r.scan_lines_hit):
+        return Row("occluded", "Occluded", NOTHING, note, "", help)
+    level: Level = "" if r.occluded < 0.1 else "warning" if r.occluded < 0.4 else "error"
+    return Row("occluded", "Occluded", f"{r.occluded:.0%}", note, level, help)
+
+
 def _calibration(r: Readouts) -> list[Row]:
     """Nothing where the project has none."""
     if r.calibration is None:
@@ -312,4 +318,4 @@ def _digits(value: float) -> str:
     if not math.isfinite(value):
         return "∞"
     decimals = max(0, 2 - math.floor(math.log10(abs(value)))) if value else 0
-    return f"{value:,.{min(decimals, 3)}f}"
+    return grouped(value, min(decimals, 3))

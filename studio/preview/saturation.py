@@ -94,10 +94,10 @@ def counted_saturated(images: Sequence[Image], curves: Sequence[LaserCurve]) -> 
     """(n, 2) of the scan lines that a laser's line is seen on: those whose brightest pixel saturates, and all."""
     found = np.zeros((len(curves), 2), dtype=np.int64)
     for own, image, curve in zip(found, images, curves, strict=False):
-        brightest = image.pixels.max(axis=1 if curve.axis == "rows" else 0)
+        # of a photograph in colour any of its channels
+        across = tuple(axis for axis in range(image.pixels.ndim) if axis != (0 if curve.axis == "rows" else 1))
         hit = np.unique(curve.index)
-        full = brightest[hit].reshape(len(hit), -1) >= image.saturation  # of a photograph any of its channels
-        own[:] = np.count_nonzero(full.any(axis=1)), len(hit)
+        own[:] = np.count_nonzero(image.pixels.max(axis=across)[hit] >= image.saturation), len(hit)
     return found
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from render.base.errors import InputError
 from render.base.full_disk import is_full, no_room
+from studio.runtime.place_words import in_words
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def trouble(error: BaseException, doing: str) -> Trouble:
 def _cause(error: InputError) -> str:
     lines = [_sentence(error.what)]
     if error.where:
-        lines.append(f"Where: {error.where}")
+        lines.append(f"Where: {in_words(error.where)}")
     if error.found is not None:
         text = str(error.found)
         lines.append(f"Found: {text if len(text) <= 300 else text[:297] + '...'}")

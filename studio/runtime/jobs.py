@@ -14,6 +14,7 @@ from typing import Generic, TypeVar
 
 from render.base.errors import Cancelled, InputError
 from render.base.threads import Cancel
+from studio.runtime.place_words import in_words
 
 Result = TypeVar("Result")
 Progress = Callable[[str, float], None]
@@ -55,7 +56,7 @@ class Problem:
 def explain(error: BaseException, name: str) -> Problem:
     """The problem that an exception stands for."""
     if isinstance(error, InputError):
-        return Problem(str(error), "", error)
+        return Problem(in_words(str(error)), "", error)
     details = "".join(traceback.format_exception(error))
     if isinstance(error, MemoryError):
         cure = "close other programs, or choose a smaller image scale, a smaller image or lighter meshes"

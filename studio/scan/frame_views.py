@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.report.colour import wavelength_colour
+from analysis.report.units import grouped
 from render.base.arrays import Float32
 from render.frame import Frame
 from render.output.tone_mapping import Picture, colour, colour_table, grey, mapped, white_level
@@ -126,7 +127,7 @@ def at_pixel(scene: Scene, frame: Frame, images: list[Image], row: int, column: 
             continue
         number = int(image.pixels[row, column])
         electrons = (number - image.black_level) / image.gain
-        full = ", saturated" if number >= image.saturation else f" ({electrons:,.0f} e-)"
+        full = ", saturated" if number >= image.saturation else f" ({grouped(electrons)} e-)"
         rows.append((name, f"{number}{full}"))
     for i, laser in enumerate(scene.lasers):
         direct = float(frame.laser_direct[i][row, column])

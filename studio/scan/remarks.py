@@ -13,6 +13,7 @@ from render.base.errors import InputError
 from render.frame import Frame
 from render.sensor.develop import Image
 from studio.project.project import Project
+from studio.runtime.place_words import in_words
 from studio.scan.gauging import patches, readings
 from studio.scan.image_lacks import image_lacks
 from studio.scan.stages import Measurement
@@ -44,7 +45,7 @@ def frame_remarks(project: Project, frame: Frame, measurements: Measurements, do
         lacks = image_lacks(project, best(measurements, project))
         said = [*result_remarks(record), *lacks.values()]
         of_all = [OF_ALL_LASERS] if said and len(project.scene.lasers) > 1 else []
-        return [*doubts, *frame.warnings, *of_all, *said]
+        return [*doubts, *map(in_words, frame.warnings), *of_all, *said]
 
 
 def result_remarks(record: ScanRecord) -> list[str]:

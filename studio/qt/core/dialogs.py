@@ -82,7 +82,7 @@ def ask_under_way(parent: QWidget, what: str) -> bool:
 
 def ask_loss(parent: QWidget, what: str) -> bool:
     """Whether to close although what took long goes with it; what: sentences about it."""
-    return _ask_to_go(parent, "not-kept", "Not kept", "Close without it?", "Close", what)
+    return _ask_to_go(parent, "not-kept", "Not kept", "Close all the same?", "Close", what)
 
 
 def ask_removal(parent: QWidget, what: str) -> bool:

@@ -54,9 +54,14 @@ def keep_room(label: QLabel, lines: int) -> None:
     """For so many lines at least, also while it is hidden: what stands below stays where it is as the text changes."""
     label.setMinimumHeight(lines * label.fontMetrics().lineSpacing())
     label.setAlignment(Qt.AlignmentFlag.AlignTop)
-    policy = label.sizePolicy()
+    keep_size(label)
+
+
+def keep_size(widget: QWidget) -> None:
+    """Its room, also while it is hidden."""
+    policy = widget.sizePolicy()
     policy.setRetainSizeWhenHidden(True)
-    label.setSizePolicy(policy)
+    widget.setSizePolicy(policy)
 
 
 def no_higher(*widgets: QWidget) -> None:

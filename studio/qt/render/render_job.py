@@ -18,6 +18,7 @@ from studio.project.project import Project
 from studio.qt.core.render import Render
 from studio.qt.core.session import Session
 from studio.runtime.jobs import Progress
+from studio.runtime.place_words import in_words
 from studio.scan.kernel_warm_up import all_compiled, begin, needed, warm_up
 from studio.scan.render_goal import goal_of
 
@@ -100,7 +101,7 @@ class FirstFigures(QObject):
         for text in texts:
             if text not in self._told:
                 self._told.add(text)
-                self.session.message.emit("warning", text)
+                self.session.message.emit("warning", in_words(text))
 
     def _measured(self) -> None:
         render = self.session.shown

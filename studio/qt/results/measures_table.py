@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
 from analysis.report.colour import method_name
-from analysis.report.units import digits, digits_of_percent
+from analysis.report.units import digits, digits_of_percent, grouped
 from studio.qt.core import theme
 from studio.scan.result_series import COVERED, OUTLIERS, UNCERTAINTY, readable_unit
 
@@ -46,7 +46,7 @@ def shown(value: float, unit: str = "") -> str:
     if math.isnan(value):
         return "-"
     if value == round(value):
-        return f"{value:.0f}"
+        return grouped(value)
     return digits_of_percent(value) if unit == "%" else digits(value)
 
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtCore import QEvent, QObject
+from PySide6.QtWidgets import QApplication, QGridLayout, QLabel, QSizePolicy, QWidget
 
 from analysis.gauges.gauge import NEVER_NEGATIVE, Gauge
 from render.base.errors import InputError
@@ -53,6 +54,11 @@ class PartEditor(QWidget):
         self._dragged = False
         self._given_up = ""
         """Why what was typed was dropped, as its field is about to be left."""
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Tips of what stands above would lie over the fields while something is typed into one."""
+        focus = QApplication.focusWidget()
+        return event.type() == QEvent.Type.ToolTip and focus is not None and self.isAncestorOf(focus)
 
     def show_gauge(self, index: int, gauge: Gauge | None) -> None:
         """None: there is none to edit."""

@@ -367,6 +367,7 @@ class PartTab(QWidget):
         column.addWidget(self.editor)
         column.addStretch(0)  # room that no row needs is below all, and not between
         no_higher(self.told, self.editor)
+        self.table.viewport().installEventFilter(self.editor)
 
 
 def _free_name(kind: Kind, taken: tuple[Gauge, ...]) -> str:

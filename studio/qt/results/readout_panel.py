@@ -23,7 +23,7 @@ from studio.qt.core import theme
 from studio.qt.core.laser_box import LaserBox
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
-from studio.qt.core.widgets import ElidedLabel
+from studio.qt.core.widgets import ElidedLabel, keep_size
 from studio.qt.results.placing_fields import PlacingField, PlacingFields
 from studio.qt.results.remedy_list import RemedyList, sentence
 
@@ -144,9 +144,7 @@ class ReadoutPanel(QWidget):
             note.setText(row.note)
             if row.note:
                 # a range that comes and goes would move the fields below from under the mouse
-                policy = note.sizePolicy()
-                policy.setRetainSizeWhenHidden(True)
-                note.setSizePolicy(policy)
+                keep_size(note)
             note.setVisible(bool(row.note))
             told = f"<p>{row.label}: {row.help}</p>" + (f"<p>{row.note}</p>" if row.note else "")
             for label, style in (

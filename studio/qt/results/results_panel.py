@@ -96,7 +96,7 @@ class ResultsPanel(QWidget):
         self.region = RegionTab(session, self.rows, self.profile, self.scan_bar)
         self.scan_steps = scan_steps(session)
         self.top = HeadRow(self.scan_bar)
-        self.head, self.head_text = self.top.frame, self.top.text
+        self.head, self.head_text = self.top.banner, self.top.banner.text
         self.notices = Remarks(), Remarks()
         """What a reader should notice: below the measures, and in a tab where there is no room below them."""
         self._lay_out()
@@ -338,9 +338,7 @@ class ResultsPanel(QWidget):
     def _repaint(self) -> None:
         for plot in (self.rows, self.profile, self.histogram, self.by_step):
             plot.repaint_theme()
-        colours = theme.colours()
-        ground = theme.mixed(colours.warning, colours.window, 0.3)
-        self.head.setStyleSheet(f"QFrame, QLabel {{ background: {ground}; }}")
+        self.head.repaint_theme()
         self.refresh()
 
     def _lay_out(self) -> None:

@@ -222,6 +222,18 @@ def test_nothing_lit_leaves_what_the_rig_alone_decides() -> None:
     assert {found.value for found in rows(r) if found.key in ("angle", "depth", "peak", "sigma")} == {NOTHING}
 
 
+def test_of_no_line_no_share_is_occluded() -> None:
+    """0 % was told of a fan that falls between two scan lines, and a dash where there is no object."""
+    project = sample("step_block")
+    for wrong in ((("scene", "objects"), ()), (("scene", "rig", "lasers", 0, "fan_angle"), math.radians(0.001))):
+        none = replaced(project, *wrong)
+        assert read(none, "step_block").scan_lines_hit == 0
+        assert row(none, "step_block", "occluded").value == NOTHING
+    behind = Pose(translation=(0.0, 0.0, 1.5), rotation=(math.pi, 0.0, 0.0))
+    hidden = replaced(project, ("scene", "rig", "lasers", 0, "T_rig_laser"), behind)
+    assert row(hidden, "step_block", "occluded").value == "100%", "all of it is behind the block"
+
+
 def test_rows_warn_where_a_value_leaves_its_sensible_range() -> None:
     project = replaced(sample("plane"), (*CAMERA, "lens", "focus_distance"), 0.8663)
     assert {found.key: found.level for found in rows(read(project, "plane")) if found.level} == {}

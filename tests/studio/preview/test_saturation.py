@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from render.frame import Axis, LaserCurve
 from render.render import render_world
 from render.sensor.develop import Image, develop
 from render.sensor.sensor import Sensor
@@ -14,7 +15,7 @@ from studio.preview.inspection import inspect, view_warnings
 from studio.preview.preview import Preview
 from studio.preview.readout_rows import rows
 from studio.preview.readouts import readouts
-from studio.preview.saturation import brightest, exceeding, full_electrons, saturated_lines
+from studio.preview.saturation import brightest, counted_saturated, exceeding, full_electrons, saturated_lines, shares
 from studio.project.document import replaced
 from studio.project.project import Project
 from studio.project.templates import template_folder
@@ -101,3 +102,19 @@ def test_design_and_inspection_tell_the_share_of_rows_that_a_developed_render_sa
 def share_of_rows(image: Image, hit: int) -> float:
     """Of the rows that are hit, those whose brightest pixel is saturated."""
     return float(np.sum(image.pixels.max(axis=1) >= image.saturation)) / hit
+
+
+@pytest.mark.parametrize("axis", ["rows", "columns"])
+def test_scan_lines_are_counted_in_images_of_any_axis_with_colours_and_without_a_line(axis: Axis) -> None:
+    """A frame whose line had left the part ended the scan."""
+    pixels = np.zeros((40, 30, 3), np.uint8)
+    pixels[5, 7, 2] = pixels[6, 7, 0] = pixels[39, 29, 1] = 255
+    nothing = np.zeros(0)
+    for colours in (pixels, pixels.max(axis=2)):
+        image = Image(colours, 8, 1.0, 0.0, 255.0, 1.0, None)
+        for index, full in (((4, 5, 5, 6, 7), {"rows": 2, "columns": 1}[axis]), ((), 0)):
+            lines = np.array(index, dtype=np.int32)
+            curve = LaserCurve(axis, lines, *[nothing] * 8, np.zeros((0, 2, 3)), nothing)
+            (told,) = counted_saturated([image], [curve]).tolist()
+            assert told == [full, len(set(index))]
+            assert shares(np.array([told])) == [full / 4 if index else None]

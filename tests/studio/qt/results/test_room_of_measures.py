@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QHeaderView, QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent
+from PySide6.QtGui import QHelpEvent
+from PySide6.QtWidgets import QApplication, QHeaderView, QToolTip, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
 from analysis.gauges.gauge import Gauge
@@ -25,6 +27,31 @@ def test_a_list_of_measures_has_the_room_that_there_is(panel: ResultsPanel, qtbo
         above = part.table.y() - part.told.y() - part.told.sizeHint().height()
         assert above < 10 and part.editor.y() - part.table.geometry().bottom() < 10
         qtbot.waitUntil(lambda: not part.table.verticalScrollBar().isVisible())
+
+
+def test_the_tip_of_a_row_is_not_over_the_fields_that_are_typed_into(panel: ResultsPanel, qtbot: QtBot) -> None:
+    panel.figures.setCurrentIndex(PART)
+    panel.session.set(("measures",), (Gauge(name="level", kind="step", regions=SIDES),))
+    part = panel.part
+    part.table.selectRow(0)
+    qtbot.waitUntil(part.editor.isVisible)
+    with qtbot.waitActive(panel):
+        panel.activateWindow()
+    place = part.table.visualItemRect(part.table.item(0, 0)).center()
+    view = part.table.viewport()
+
+    def rest() -> None:
+        QApplication.sendEvent(view, QHelpEvent(QEvent.Type.ToolTip, place, view.mapToGlobal(place)))
+
+    part.editor.fields["nominal"].setFocus()
+    qtbot.waitUntil(part.editor.fields["nominal"].hasFocus)
+    rest()
+    assert not QToolTip.isVisible()
+    part.table.setFocus()
+    qtbot.waitUntil(part.table.hasFocus)
+    rest()
+    assert QToolTip.isVisible()
+    QToolTip.hideText()
 
 
 def test_rows_that_are_too_wide_are_all_seen(qtbot: QtBot) -> None:

@@ -169,6 +169,21 @@ class TestFiles:
         assert not window.close()
         assert "A render is under way" in told[0] and "2 renders of this session go" in told[0]
 
+    def test_the_question_is_right_of_one_render_and_of_three(
+        self, window: MainWindow, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Of three it asked "Close without it?"."""
+        world, frame = small_render()
+        long = replace(frame, seconds={"laser light": 12.0})
+        asked: list[tuple[str, str]] = []
+        monkeypatch.setattr(QMessageBox, "exec", lambda box: asked.append((box.text(), box.informativeText())))
+        for count in (1, 3):
+            made = [Render(k, window.session.project, world, long, asked=True) for k in range(count)]
+            monkeypatch.setattr(window.session, "renders", made)
+            assert not window.files.may_close()
+        assert [question for question, _ in asked] == 2 * ["Close all the same?"]
+        assert "3 renders of this session" in asked[1][1]
+
     def test_a_project_dropped_on_the_window_is_opened(
         self, window: MainWindow, qtbot: QtBot, small_project: Path
     ) -> None:
