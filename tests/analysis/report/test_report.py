@@ -398,12 +398,3 @@ def test_materials_are_told_with_what_decides_how_they_shine(material, told):
     shown = report.scene.model_copy(update={"objects": (wall.model_copy(update={"material": material}),)})
     (line,) = scene_tables(dataclasses.replace(report, scene=shown))["Objects"].values()
     assert line == f"plane, 2 triangles, {told}"
-
-
-def test_the_lens_is_told_by_its_own_focal_length():
-    report = make_report()
-    camera = Camera.from_physical(64, 48, 3.45e-6, 0.025, focus_distance=0.403)
-    rig = report.scene.rig.model_copy(update={"camera": camera})
-    told = scene_tables(dataclasses.replace(report, scene=report.scene.model_copy(update={"rig": rig})))["Camera"]
-    assert told["Lens"].startswith("25.00\u00a0mm, f/1.4, ") and "focused 403.0\u00a0mm" in told["Lens"]
-    assert told["Image distance"] == "26.65\u00a0mm"
