@@ -154,6 +154,17 @@ def blur_px(camera: Camera, points: Float) -> Float:
     return np.asarray(dioptre_px(camera) * np.abs(points @ plane[:3] + plane[3]) / points[:, 2])
 
 
+def blurred(width: Float, amplitude: Float, disc: Float) -> tuple[Float, Float]:
+    """(n,) sigma, px, and peak of a Gaussian line, and diameter of the disc that it is spread by, px -> both of what
+    an image has: the variance of a disc along one axis is d^2 / 16, and its mean of a Gaussian at the centre
+    exp(-z) (I0(z) + I1(z)), z = (d / 4 sigma)^2.
+    """
+    from scipy.special import ive
+
+    z = (0.25 * disc / width) ** 2
+    return np.hypot(width, 0.25 * disc), np.asarray(amplitude * (ive(0, z) + ive(1, z)))
+
+
 def depth_of_field(camera: Camera, sharp_px: float = SHARP_PX) -> tuple[float, float]:
     """Nearest and farthest depth on the axis at which the blur disc is at most `sharp_px` across; inf: no end."""
     reach, focus = sharp_px / dioptre_px(camera), camera.focus_vergence

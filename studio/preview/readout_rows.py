@@ -286,7 +286,7 @@ def _calibration(r: Readouts) -> list[Row]:
 def _supposed(r: Readouts) -> tuple[str, Level]:
     """What the depth's noise takes the line to be, and it is not."""
     wrong = []
-    if r.blur_px is not None and r.blur_px.high > BLURRED_PX:
+    if r.blur_px is not None and r.blur_px.high > BLURRED_PX and not r.blurs_images:
         wrong.append("in focus")
     if r.spreads:
         wrong.append("opaque")

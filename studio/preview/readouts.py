@@ -149,6 +149,8 @@ def readouts(look: Look, laser: int) -> Readouts:
     width = estimates.line_width_px(camera, source, T_camera_laser, lit.normal, curve.point, pixels, rows)
     ambient = estimates.ambient_electrons(look, lit, pixels) + sensor.dark_current * sensor.exposure_time
     amplitude = estimates.line_electrons(camera, source, sensor, lit, pixels)
+    if known.blurs_images:
+        width, amplitude = estimates.blurred(width, amplitude, estimates.blur_px(camera, curve.point))
     light = amplitude * estimates.pixel_share(curve.position, width)
     peak = light + ambient
     read = estimates.read_variance(sensor)

@@ -12,6 +12,7 @@ from render.base.files import atomic_write
 from studio.project.project import Project
 from studio.scan.height_map import points_of
 from studio.scan.reconstruct import reconstruct_folder
+from studio.scan.scan_folder import open_folder
 from studio.scan.scan_results import ScanResults
 from studio.scan.stages import Clock
 
@@ -47,5 +48,5 @@ def measure_scan_again(scan: ScanResults, project: Project, clock: Clock) -> Non
 
     InputError: as `reconstruct_folder`.
     """
-    found = scan.found
+    found = open_folder(scan.found.folder)  # it may have been measured since it was opened
     reconstruct_folder(found, project, found.root, found.folder, clock, report=scan.report is not None)

@@ -102,4 +102,4 @@ class ProfilePlot(plots.PointedPlots):
 
 
 def _height(section: ProfileSection) -> str:
-    return "Distance from the laser" if section == "laser_plane" else "From the laser"
+    return "Distance from the laser" if section == "laser_plane" else "Distance in the section"

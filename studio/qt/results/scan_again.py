@@ -53,7 +53,7 @@ class ScanAgain(QObject):
             if session.document is document:
                 self._show(render)
 
-        self.runner.run(LANE, "measure the scan again", work, then)
+        self.runner.run(LANE, "measure the scan again", work, then, interrupt=True)
 
     def _show(self, before: Render) -> None:
         """In place of what was shown, whose figures its folder no longer has."""

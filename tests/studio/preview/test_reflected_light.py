@@ -63,3 +63,18 @@ def test_what_is_not_opaque_is_told() -> None:
     wax = project.replaced({f"scene.objects[{last}].material": Subsurface()}).in_folder(project.folder)
     for one, spreads in ((project, False), (wax, True)):
         assert readouts(Preview().look(one, project.folder), 0).spreads == spreads
+
+
+@pytest.mark.parametrize(("f_number", "focus"), [(4.0, 0.6), (1.4, 0.6), (1.4, 0.4)])
+def test_the_peak_and_the_width_of_a_line_out_of_focus_are_as_rendered(f_number: float, focus: float) -> None:
+    """Blurred over 10 px it was told to saturate, of a render that was at half of that."""
+    project = made_of(Lambertian(albedo=0.5))
+    lens = {"model": "thin-lens", "f_number": f_number, "focus_distance": focus}
+    changed = {f"scene.rig.camera.lens.{name}": value for name, value in lens.items()}
+    project = project.replaced(changed).in_folder(project.folder)
+    told = readouts(Preview().look(project, project.folder), 0)
+    (seen,) = laser_views(project, render(project))
+    assert told.peak_electrons is not None and told.width_px is not None and seen.peak_electrons is not None
+    assert told.peak_electrons.middle == pytest.approx(seen.peak_electrons, rel=0.15)
+    if told.width_px.middle > 1.0:
+        assert told.width_px.middle == pytest.approx(seen.width_px, rel=0.15)
