@@ -8,11 +8,10 @@ from html import escape
 from PySide6.QtWidgets import QFrame, QLabel, QVBoxLayout
 
 from studio.qt.core import theme
-from studio.qt.core.widgets import keep_size
 
 
 class HeadBanner(QFrame):
-    """It keeps its room once it has said something: what comes and goes while a render goes on moves nothing below."""
+    """Without room of its own while it says nothing, which a low window has not."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -26,8 +25,6 @@ class HeadBanner(QFrame):
         """Nothing: it is not seen."""
         self.text.setText("   ".join(told))
         self.text.setToolTip("".join(f"<p>{escape(text)}</p>" for text in told))
-        if told:
-            keep_size(self)
         self.setVisible(bool(told))
 
     def repaint_theme(self) -> None:

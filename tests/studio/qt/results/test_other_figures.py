@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import QPoint, QPointF
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QPointF
 from pytestqt.qtbot import QtBot
 
 from render.checkpoint import RenderState
@@ -22,7 +21,7 @@ from studio.qt.image.camera_view import CameraView
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.render.history import History
 from studio.qt.render.render_panel import RenderPanel
-from studio.qt.results.heads import AWAITED, CHANGED, REFINING, STOPPED
+from studio.qt.results.heads import CHANGED, STOPPED
 from studio.qt.results.measures_table import MeasuresTable
 from studio.qt.results.readout_panel import ReadoutPanel
 from studio.qt.results.results_panel import ResultsPanel
@@ -233,24 +232,6 @@ def test_a_render_that_was_stopped_says_that_light_is_missing(results: ResultsPa
     assert STOPPED in results.head_text.text()
     results.session.add_render(replace(stopped, final=False, state=None, number=3))
     assert STOPPED not in results.head_text.text(), "more is to come by itself"
-
-
-def test_what_is_said_while_a_render_goes_on_moves_nothing_as_it_goes(results: ResultsPanel, qtbot: QtBot) -> None:
-    """It came and went, and all below it moved by 26 px from under the mouse."""
-    results.resize(1366, 500)
-    results.show()
-    qtbot.waitExposed(results)
-    render = replace(another_render(), final=False)
-    results.session.add_render(render)
-    qtbot.waitUntil(lambda: REFINING in results.head_text.text() or AWAITED in results.head_text.text())
-    qtbot.waitUntil(results.head.isVisible)
-    QApplication.processEvents()
-    before = results.laser.mapTo(results, QPoint()), results.figures.mapTo(results, QPoint())
-    render.final = True
-    results.session.renders_changed.emit()
-    qtbot.waitUntil(lambda: not results.head.isVisible())
-    QApplication.processEvents()
-    assert (results.laser.mapTo(results, QPoint()), results.figures.mapTo(results, QPoint())) == before
 
 
 def test_the_profile_of_a_render_says_that_the_scene_has_changed(camera: CameraView) -> None:
