@@ -63,8 +63,11 @@ def of_project(data: dict[str, Any]) -> Calibration:
 def in_window(error: InputError) -> str:
     """An error as the window tells it, which has no options."""
     named = (
-        ("other --nearest and --farthest", "other distances"),
+        (" (--nearest and --farthest)", ""),
+        ("beyond --nearest", "beyond the nearest distance"),
         ("--farthest", "Range"),
+        ("--lens so many", "so many numbers of the lens"),
+        ("--paper", "Paper"),
         ("--board", "Board"),
         ("--out", "name"),
     )

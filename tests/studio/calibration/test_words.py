@@ -10,6 +10,7 @@ from analysis.calibration.next_pose import Advice
 from render.base.errors import InputError
 from studio.calibration.board_text import parse_board
 from studio.calibration.in_silico import virtual_views
+from studio.calibration.solving import in_window
 from studio.calibration.words import lens_sentence, next_sentence
 from studio.project.project import Project
 from studio.project.templates import template_folder
@@ -55,3 +56,17 @@ def test_a_board_that_no_place_shows_is_not_told_as_found() -> None:
     told = str(refused.value)
     assert "too little of a board of 13 x 9 corners that are 2000 mm apart, from 400 to 600 mm before it" in told
     assert "found" not in told
+
+
+@pytest.mark.parametrize(
+    ("where", "allowed", "cure"),
+    [
+        ("--farthest", "beyond --nearest, 0.5 m", ""),
+        ("--paper", "A4 or A3", "--paper A3, or smaller squares"),
+        ("--board", "8x6@10", "hold it at other distances (--nearest and --farthest)"),
+        ("", "", "calibrate with --lens so many"),
+        ("", "", "choose another --out"),
+    ],
+)
+def test_the_window_names_no_option_of_the_command(where: str, allowed: str, cure: str) -> None:
+    assert "--" not in in_window(InputError("not allowed", where=where, allowed=allowed, cure=cure))
