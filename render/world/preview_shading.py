@@ -17,15 +17,6 @@ from render.world.triangles import Surface, reflectance
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def reflectance_at(surface: Surface, triangle: Int, points: Float) -> Float:
-    """(n,) triangles and (n, 3) points on them -> (n, 3) albedo."""
-    out = np.empty((triangle.shape[0], 3))
-    for i in range(triangle.shape[0]):
-        reflectance(surface, triangle[i], points[i, 0], points[i, 1], points[i, 2], out[i])
-    return out
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
 def mean_across(q: float, slope_u: float, slope_v: float) -> float:
     """Mean of the unit Gaussian over a pixel in which q changes by the slopes: a box, widened by the lesser slope."""
     wide, narrow = max(abs(slope_u), abs(slope_v)), min(abs(slope_u), abs(slope_v))

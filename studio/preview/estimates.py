@@ -1,6 +1,6 @@
 """Closed-form estimates for a rig: resolution, width, electrons, noise and blur of the line.
 
-Diffuse surfaces, unshadowed ambient light, a thin lens: what a render tells exactly, these tell while dragging.
+Unshadowed ambient light, a thin lens: what a render tells exactly, these tell while dragging.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.camera.camera import Camera
 from render.laser.laser import LineLaser
-from render.scene.lights import PointLight
 from render.sensor.response import band_response, joules_per_radiance, laser_response
 from render.sensor.sensor import Sensor
 from studio.preview.preview import Lit, Look
@@ -89,23 +88,8 @@ def pixel_share(position: Float, sigma: Float) -> Float:
 def ambient_electrons(look: Look, lit: Lit, pixels: Float) -> Float:
     """(n,) electrons of environment and lamps at the points of the line, as if nothing threw shadows."""
     scene, sensor = look.scene, look.project.sensor
-    T_world_camera = scene.T_world_camera(look.step)
-    points, normals = transform_points(T_world_camera, lit.curve.point), lit.normal @ T_world_camera[:3, :3].T
-    irradiance = np.pi * np.broadcast_to(np.array(scene.environment.radiance), points.shape).copy()
-    for light in scene.lights:
-        matrix = light.T_world_light.matrix
-        towards = matrix[:3, 3] - points
-        square = np.einsum("ij,ij->i", towards, towards)
-        cosine = np.maximum(np.einsum("ij,ij->i", normals, towards), 0.0) / np.sqrt(square)
-        if isinstance(light, PointLight):
-            strength = np.array(light.intensity)
-        else:
-            emitted = np.maximum(-(towards @ matrix[:3, 2]), 0.0) / np.sqrt(square)
-            cosine, strength = cosine * emitted, np.array(light.radiance) * light.width * light.height
-        irradiance += (cosine / square)[:, None] * strength
-    radiance = lit.albedo * irradiance / np.pi
     response = joules_per_radiance(scene.camera, sensor) * band_response(sensor)
-    electrons = np.einsum("ij,ij->i", _by_pixel(response, pixels), radiance)
+    electrons = np.einsum("ij,ij->i", _by_pixel(response, pixels), lit.unshadowed)
     return np.asarray(electrons * _cos4(scene.camera, lit))
 
 

@@ -28,11 +28,11 @@ from render.truth.laser_curve import curve_of_cut, cut_triangles
 from render.truth.visibility import visible
 from render.world.embree import RayScene
 from render.world.plane_culling import block_boxes, crossing_in_blocks
-from render.world.preview_shading import reflectance_at
 from render.world.triangles import Surface
 from render.world.world import place_meshes
 from studio.preview.preview_image import PreviewImage, Speed, preview_image
 from studio.preview.reflected_light import reflected_light
+from studio.preview.unshadowed_light import unshadowed_light
 from studio.project.project import Project
 
 Mask = NDArray[np.bool_]
@@ -97,8 +97,8 @@ class Lit:
     curve: LaserCurve
     normal: Float
     """(n, 3) unit facet normal towards the camera, camera frame."""
-    albedo: Float
-    """(n, 3) RGB."""
+    unshadowed: Float
+    """(n, 3) RGB radiance of environment and lamps towards the camera as if nothing threw shadows, W/(m^2 sr)."""
     reflected: Float
     """(n,) of the laser's light towards the camera: the reflectance of a diffuse surface that would be as bright."""
 
@@ -191,7 +191,7 @@ class Look:
         return self.lit(laser).curve
 
     def lit(self, laser: int) -> Lit:
-        """The lit curve with normals and albedo."""
+        """The lit curve with normals and how bright it is."""
         if laser not in self._lit:
             self._lit[laser] = self._cut(laser)
         return self._lit[laser]
@@ -251,23 +251,24 @@ class Look:
         )
         owner = curve.object_id
         points = transform_points(T_world_camera, curve.point)
-        albedo, reflected = np.empty((len(owner), 3)), np.empty(len(owner))
+        unshadowed, reflected = np.empty((len(owner), 3)), np.empty(len(owner))
         for k, item in enumerate(self.placed):
             mine = place[owner] == k
             local = transform_points(item.T_object_world, points[mine])
-            albedo[mine] = reflectance_at(item.body.surface, triangle[owner[mine]], local)
             ends = transform_points(item.T_object_world, np.stack([T_world_camera[:3, 3], T_world_laser[:3, 3]]))
             material = scene.visible_objects[item.index].material
-            reflected[mine] = reflected_light(
-                item.body.surface_at, material, laser.wavelength_nm, triangle[owner[mine]], local, *ends
+            facets = triangle[owner[mine]]
+            unshadowed[mine] = unshadowed_light(
+                scene, item.body.surface, material, facets, local, item.T_object_world, ends[0]
             )
+            reflected[mine] = reflected_light(item.body.surface_at, material, laser.wavelength_nm, facets, local, *ends)
         normal = normals[owner] @ T_world_camera[:3, :3]
         normal /= -np.sign(np.einsum("ij,ij->i", normal, curve.point))[:, None] * np.linalg.norm(
             normal, axis=1, keepdims=True
         )
         index = np.array([item.index for item in self.placed], dtype=np.int32)
         objects = index[place[owner]] if len(owner) else np.zeros(0, np.int32)
-        return Lit(dataclasses.replace(curve, object_id=objects), normal, albedo, reflected)
+        return Lit(dataclasses.replace(curve, object_id=objects), normal, unshadowed, reflected)
 
     def _trace_fan(self, i: int) -> Fan:
         scene, laser, T = self.scene, self.scene.lasers[i], self.scene.T_world_laser(i, self.step)

@@ -143,10 +143,12 @@ def test_a_move_rebuilds_nothing(crowded: tuple[Project, Path]) -> None:
 def test_albedo_and_normals_along_the_curve_are_the_surfaces(crowded: tuple[Project, Path]) -> None:
     project, root = crowded
     project = replaced(project, (*OBJECTS, 2, "material", "albedo"), (0.9, 0.5, 0.1))
+    project = replaced(project, (*SCENE, "environment", "radiance"), (1.0, 1.0, 1.0))
+    project = replaced(project, (*SCENE, "lights"), ())
     lit = Preview(1).look(project, root).lit(0)
     ball, plate = lit.curve.object_id == 2, lit.curve.object_id == 0
-    np.testing.assert_allclose(lit.albedo[ball], np.broadcast_to((0.9, 0.5, 0.1), (ball.sum(), 3)))
-    np.testing.assert_allclose(lit.albedo[plate], 0.5)
+    np.testing.assert_allclose(lit.unshadowed[ball], np.broadcast_to((0.9, 0.5, 0.1), (ball.sum(), 3)))
+    np.testing.assert_allclose(lit.unshadowed[plate], 0.5)
     to_camera = -lit.curve.point / lit.curve.depth_range[:, None]
     cosine = np.einsum("ij,ij->i", lit.normal, to_camera)
     np.testing.assert_allclose(np.arccos(cosine), lit.curve.camera_angle, atol=1e-7)
@@ -187,7 +189,7 @@ def test_a_laser_that_only_grazes_the_scene_has_an_empty_curve(crowded: tuple[Pr
     project, root = crowded
     away = LineLaser(T_rig_laser=Pose(rotation=(0, math.pi, 0), translation=(0.2, 0, 0)))
     look = Preview(1).look(replaced(project, (*SCENE, "rig", "lasers"), (away,)), root)
-    assert len(look.lit_curve(0).index) == 0 and look.lit(0).albedo.shape == (0, 3)
+    assert len(look.lit_curve(0).index) == 0 and look.lit(0).unshadowed.shape == (0, 3)
     fan = look.fan(0)
     assert not np.isfinite(fan.distance).any() and fan.occluded is None
     assert look.image(1 / 16).laser[0].max() == 0.0

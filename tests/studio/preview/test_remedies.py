@@ -184,7 +184,7 @@ def test_what_is_told_as_a_gain_is_better_and_what_is_worse_is_the_price(
 ) -> None:
     """A smaller aperture told of more noise by speckle as if it gained by that."""
     priced = [remedy.price for _, remedy in proposed if remedy.price]
-    assert any(re.fullmatch(r"depth noise with speckle from 245 to 312 µm", price) for price in priced)
+    assert any(re.fullmatch(r"depth noise with speckle from 245 to 311 µm", price) for price in priced)
     for _, remedy in proposed:
         gains = [part for part in remedy.gain.split(", ")[1:] if not part.startswith("sigma from")]
         for better, parts in ((True, gains), (False, remedy.price.split(", ") if remedy.price else [])):
