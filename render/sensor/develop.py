@@ -222,7 +222,7 @@ class _Optics:
     def __init__(self, frame: Frame, scene: Scene, sensor: Sensor, threads: int | None) -> None:
         self.camera, self.sensor, self.threads = scene.camera, sensor, threads
         self.diameter = None
-        if sensor.defocus_by(scene.camera.lens.model).startswith("developing"):
+        if sensor.needs_depth(scene.camera.lens.model):
             if frame.truth is None:
                 cure = "render the frame with its truth, or switch defocus off"
                 raise InputError(

@@ -10,6 +10,7 @@ from render.base.model import Model, UnitInterval, quantity
 
 Wavelength = Annotated[float, Field(ge=1.0, le=1e5)]
 ColourGain = Annotated[float, Field(ge=0.1, le=10.0)]
+DEFOCUS_BY_DEPTH = "developing, by depth"
 PATTERNS = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
 
 
@@ -158,7 +159,11 @@ class Sensor(Model):
         """What blurs out of focus: never two at once. lens_model: as of `render.camera.camera.Lens`."""
         if lens_model == "thin-lens":
             return "the rendered lens"
-        return "developing, by depth" if self.defocus else "nothing"
+        return DEFOCUS_BY_DEPTH if self.defocus else "nothing"
+
+    def needs_depth(self, lens_model: str) -> bool:
+        """Developing asks for the depth of pixels."""
+        return self.defocus_by(lens_model) == DEFOCUS_BY_DEPTH
 
     @property
     def dn_per_electron(self) -> float:

@@ -119,7 +119,7 @@ def scan_into(
 
     if not quiet:
         scene = project.scene if options.at_scale else project.scene.scaled(options.image_scale)
-        plan = expected_plan(scene, project.render)
+        plan = expected_plan(scene, project.render_settings)
         print_plan(plan_lines(plan), to_errors=True)
     frames = min(options.steps or project.scene.frame_count, project.scene.frame_count)
     with stage_progress(quiet, lambda stage: stage_note(stage, quality, foretold), frames=frames) as progress:

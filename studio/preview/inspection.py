@@ -123,7 +123,8 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
     check_materials(world, scene)
     dark = scene.model_copy(update={"lights": (), "environment": Environment(), "motion": NoMotion()})
     probe = {"laser_error": PROBE_ERROR, "indirect_error": PROBE_REFLECTED, "light_paths": 1 << 20}
-    settings = project.render.model_copy(update={**probe, "truth_images": False})
+    depth = project.sensor.needs_depth(scene.camera.lens.model)
+    settings = project.render.model_copy(update={**probe, "truth_images": depth})
     frame = render_world(world, dark, settings=settings, axis=project.extraction.axis, run=Run(threads=threads))
     look = Preview(threads).look(project, root)
     views = laser_views(project, frame, beneath=[_ambient_beneath(look, i) for i in range(len(frame.curves))])
@@ -142,7 +143,7 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
             *scene_warnings(world, scene),
             *(one.told for one in inside(look) if one.enclosed),
         ),
-        plan=expected_plan(scene, project.render).with_steps("indirect", frame.plan.of("indirect")),
+        plan=expected_plan(scene, project.render_settings).with_steps("indirect", frame.plan.of("indirect")),
     )
 
 

@@ -65,6 +65,13 @@ class Project(Model):
     delivery: Delivery = Delivery()
     _folder: Path = PrivateAttr(default_factory=Path)
 
+    @property
+    def render_settings(self) -> RenderSettings:
+        """`render`, with the truth of pixels wherever the sensor's defocus needs their depth."""
+        if self.render.truth_images or not self.sensor.needs_depth(self.scene.camera.lens.model):
+            return self.render
+        return self.render.model_copy(update={"truth_images": True})
+
     @model_validator(mode="after")
     def _every_laser_is_calibrated(self) -> Self:
         found, given, lasers = self.calibration, self.calibration.laser_count, len(self.scene.lasers)

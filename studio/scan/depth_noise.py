@@ -53,7 +53,7 @@ def foreseen_noise(project: Project, root: Path, threads: int | None = None) -> 
     goal, scene = project.render.goal, project.scene
     if goal is None or not scene.lasers:
         return ()
-    steps = [step for step in expected_plan(scene, project.render).steps if step.computed is not False]
+    steps = [step for step in expected_plan(scene, project.render_settings).steps if step.computed is not False]
     there = {step.group for step in steps if step.reason != "absent"}
     direct, other = shares(goal, reflected="indirect" in there, ambient="ambient" in there)
     look, found = Preview(threads).look(project, root), []

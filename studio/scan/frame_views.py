@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.report.colour import wavelength_colour
 from analysis.report.units import grouped
 from render.base.arrays import Float32
-from render.frame import Frame
+from render.frame import Frame, Truth
 from render.output.tone_mapping import Picture, colour, colour_table, grey, mapped, white_level
 from render.scene.scene import Scene
 from render.sensor.develop import Image, expected_electrons
@@ -165,7 +165,7 @@ def live_picture(project: Project, image: PreviewImage, paint: bool = False) -> 
     paint: as of `picture`.
     """
     small, sensor = scaled(project, image.scale), project.sensor
-    frame = Frame(0, image.laser, None, (), None)
+    frame = Frame(0, image.laser, None, (), _depth_alone(image))
     full = full_electrons(sensor)
     total = np.sqrt(image.shade) * np.float32(SHAPE_BRIGHTNESS)
     saturated = np.zeros(total.shape[:2], np.bool_)
@@ -179,6 +179,12 @@ def live_picture(project: Project, image: PreviewImage, paint: bool = False) -> 
             total[..., band] += np.float32(0.5 + 0.5 * share) * line
     drawn = colour(np.ascontiguousarray(total, np.float32), 1.0)
     return _painted(drawn, saturated) if paint else drawn
+
+
+def _depth_alone(image: PreviewImage) -> Truth:
+    """Of the truth of pixels what the sensor's defocus needs."""
+    unknown = np.broadcast_to(np.float32(np.nan), (*image.depth_z.shape, 3))
+    return Truth(image.depth_z, unknown[..., 0], unknown, unknown, image.object_id)
 
 
 def _painted(drawn: Picture, where: NDArray[np.bool_]) -> Picture:

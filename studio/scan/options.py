@@ -82,10 +82,9 @@ class Scan:
     def rendered(self) -> Project:
         """The project as its frames are rendered: without the truth of pixels where no frame is kept to hold it."""
         project = self.project
-        depth_is_used = project.sensor.defocus_by(project.scene.camera.lens.model).startswith("developing")
-        if self.options.frames != "none" or depth_is_used:
-            return project
-        return project.model_copy(update={"render": project.render.model_copy(update={"truth_images": False})})
+        depth_is_used = project.sensor.needs_depth(project.scene.camera.lens.model)
+        kept = depth_is_used or (project.render.truth_images and self.options.frames != "none")
+        return project.model_copy(update={"render": project.render.model_copy(update={"truth_images": kept})})
 
     @property
     def run(self) -> Run:

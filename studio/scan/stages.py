@@ -144,7 +144,7 @@ def render_step(
     cancelled = clock.cancelled if run.cancelled is never else run.cancelled
     run = replace(run, seed=project.seed, cancelled=cancelled, goal=goal_of(project, run.threads))
     placed, watch = PlacedScene(world, project.scene, step), RenderClock(clock.progress)
-    for frame in frames(placed, project.render, run, watch, axis=project.extraction.axis, scan=scan):
+    for frame in frames(placed, project.render_settings, run, watch, axis=project.extraction.axis, scan=scan):
         refined(frame)
     if project.render.goal is not None and step == 0:
         frame = _judged(project, frame, project.render.goal, clock, run.threads)

@@ -58,7 +58,7 @@ def parts_of(project: Project) -> list[Part]:
     for bounces in (1, 2):
         if render.max_bounces is None or render.max_bounces > bounces:
             found.append(Part("ambient surfaces", f"at most {bounces}", {"render.max_bounces": bounces}, (AMBIENT,)))
-    if render.truth_images:
+    if render.truth_images and not project.sensor.needs_depth(project.scene.camera.lens.model):
         found.append(Part("per-pixel truth", "none", {"render.truth_images": False}, (TRUTH,)))
     below = _below_surfaces(project)
     if below:

@@ -56,7 +56,7 @@ def render_frames(
     for frame in refine(
         world,
         project.scene,
-        settings=project.render,
+        settings=project.render_settings,
         step=step,
         axis=project.extraction.axis,
         run=replace(run, seed=project.seed, goal=goal_of(project, run.threads)),

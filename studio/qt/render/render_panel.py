@@ -297,7 +297,7 @@ class RenderPanel(QWidget):
         project = self.session.project
         scale = self.scale.currentData()
         scene = project.scene.scaled(scale if scale is not None else 1.0)
-        self.plan.setText(plan_text(expected_plan(scene, project.render)))
+        self.plan.setText(plan_text(expected_plan(scene, project.render_settings)))
 
     def _tell_render(self) -> None:
         """What was computed of the running render, else of the shown one, and how well it is known."""
