@@ -176,7 +176,7 @@ def look(cancelled: Cancel) -> None:
     from studio.preview.preview import Preview
     from studio.preview.readouts import readouts
 
-    scene = Scene(rig=Rig(camera=CAMERA, lasers=(LASER,)), objects=(PLATE,))
+    scene = _blocks(CAMERA, (), 0.05)
     made = Preview(1).look(Project(scene=scene, sensor=SENSOR), Path())
     readouts(made, 0)
     made.image(1.0)
