@@ -13,7 +13,7 @@ import numpy as np
 from analysis.report import calibration, gauge_table, plain_picture
 from analysis.report.colour import method_colour, method_name
 from analysis.report.columns import columns, sentence_height, table_height
-from analysis.report.error_figures import error_map_figure, methods_figure, nice_limit, scene_figure, steps_figure
+from analysis.report.error_figures import error_limit, error_map_figure, methods_figure, scene_figure, steps_figure
 from analysis.report.frame_result import FrameResult
 from analysis.report.front import front
 from analysis.report.glossary import GLOSSARY
@@ -74,7 +74,7 @@ def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None
     record = report.record
     frame, found = record.shown_frame(), total(record.chosen())
     view, cloud, error = cloud_view(report)
-    limit = nice_limit(error)
+    limit = error_limit(error)
     scene = scene_view(report, frame)
     vertices = placed_vertices(report, frame.step)
     header, rows, cut = step_table(report)
