@@ -27,6 +27,8 @@ Kind = Literal[
     "area",
 ]
 Verdict = Literal["pass", "fail", "undecided"]
+MISSES = "points miss "
+"""How remarks begin that the points are not of the fitted curve, with what else is told before them."""
 REGIONS: dict[Kind, tuple[str, ...]] = {
     "step": ("lower side", "upper side"),
     "width": ("reference", "left flank", "right flank"),
@@ -143,10 +145,15 @@ class Gauge(Model):
         judged = {"name": self.name, "nominal": None, "lower": None, "upper": None}
         return self.model_copy(update=judged) == other.model_copy(update=judged)
 
-    def verdict(self, value: float, sigma: float) -> Verdict | None:
-        """ISO 14253-1 with U = 2 sigma: proved within, proved outside, or neither; None: no tolerance, or no value."""
+    def verdict(self, value: float, sigma: float, remark: str = "") -> Verdict | None:
+        """ISO 14253-1 with U = 2 sigma: proved within, proved outside, or neither; None: no tolerance, or no value.
+
+        remark: of the reading; where its points miss the curve, its sigma does not hold the error and proves nothing.
+        """
         if self.nominal is None or (self.lower is None and self.upper is None) or not math.isfinite(value + sigma):
             return None
+        if MISSES in remark:
+            return "undecided"
         low, high = self.limits
         uncertainty = 2.0 * sigma
         if value - uncertainty >= low and value + uncertainty <= high:

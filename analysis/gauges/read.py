@@ -105,7 +105,7 @@ class Reading:
     @property
     def verdict(self) -> Verdict | None:
         """As of `Gauge.verdict`; None of stray light as well."""
-        return None if self.stray else self.gauge.verdict(self.value, self.sigma)
+        return None if self.stray else self.gauge.verdict(self.value, self.sigma, self.remark)
 
 
 def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> Reading:

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.measures import robust_sigma
 from analysis.report.colour import ACCENT, DIVERGING, INK, MUTED, TRUTH, method_colour, method_name
 from analysis.report.frame_result import FrameResult
 from analysis.report.model import ReportInput
 from analysis.report.picture import without_margins
 from analysis.report.style import WIDTH, figure, image_uri, png_uri, short
+from analysis.report.units import counted, micrometres
 from render.base.arrays import Float
 
 SCENE_ASPECT = 1.55
@@ -21,12 +23,32 @@ MAP_WIDTH = 4.5
 """inch, of the cloud beside its histogram."""
 WIDEST = 1400
 """px; pictures are scaled down to this."""
+USUAL_SIGMAS = 4.0
+"""Robust sigmas from their median to which errors spread without outliers."""
+REACH = 1.5
+"""Of the axis of errors, in the limit of their colours."""
 
 
 def nice_limit(error: Float) -> float:
     """1, 2 or 5 times a power of ten that holds 98 % of the errors, m; 1 um when there are none."""
     size = np.abs(error[np.isfinite(error)])
-    top = float(np.percentile(size, 98)) if len(size) else 0.0
+    return _rounded_up(float(np.percentile(size, 98)) if len(size) else 0.0)
+
+
+def error_limit(error: Float) -> float:
+    """The same of errors some of which may be gross: on their scale all others would be in one bar and one colour.
+
+    It need not hold them while nine of ten errors, and all that the usual ones spread to, are within it.
+    """
+    finite = error[np.isfinite(error)]
+    sigma = robust_sigma(finite)
+    if not sigma > 0.0:
+        return nice_limit(error)
+    usual = max(abs(float(np.median(finite))) + USUAL_SIGMAS * sigma, float(np.percentile(np.abs(finite), 90)))
+    return min(nice_limit(error), _rounded_up(usual))
+
+
+def _rounded_up(top: float) -> float:
     if top <= 0.0:
         return 1e-6
     power = 10.0 ** np.floor(np.log10(top))
@@ -67,7 +89,7 @@ def error_map_figure(path: Path, error: Float, limit: float, sigma: float) -> st
         cloud.set_axis_off()
         cloud.set_title("Distance of the points from the part")
         finite = error[np.isfinite(error)] * 1e6
-        edges = np.linspace(-limit * 1.5e6, limit * 1.5e6, 61)
+        edges = np.linspace(-limit * REACH * 1e6, limit * REACH * 1e6, 61)
         counts, _ = np.histogram(np.clip(finite, edges[0], edges[-1]), edges)
         middle = (edges[1:] + edges[:-1]) / 2
         histogram.barh(
@@ -80,7 +102,24 @@ def error_map_figure(path: Path, error: Float, limit: float, sigma: float) -> st
         histogram.axhline(0, color=TRUTH, lw=1.2)
         histogram.set(ylabel="surface error (µm), + is too far", xlabel="points", ylim=(edges[0], edges[-1]))
         histogram.set_title("Distribution and scale")
+        for side, told in zip((1, -1), beyond(error, REACH * limit), strict=True):
+            histogram.annotate(
+                told, (1.0, max(side, 0)), (0, -10 * side), xycoords="axes fraction", textcoords="offset points",
+                ha="right", va="top" if side > 0 else "bottom", fontsize=6.5, color=INK,
+            )  # fmt: skip
         return png_uri(made)
+
+
+def beyond(error: Float, reach: float) -> tuple[str, str]:
+    """How many errors lie above and below an axis to +-reach, m, and how far the farthest; empty: none does."""
+    far = error[np.isfinite(error) & (np.abs(error) > reach)]
+    return _told_beyond(far[far > 0.0], "+"), _told_beyond(far[far < 0.0], "\u2212")
+
+
+def _told_beyond(far: Float, sign: str) -> str:
+    if len(far) == 0:
+        return ""
+    return f"{counted(len(far), 'point')} beyond, to {sign}{micrometres(float(np.abs(far).max()))}"
 
 
 def steps_figure(report: ReportInput, shown: int) -> str:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from analysis.gauges.gauge import REGIONS, TITLES, Gauge, Kind
+from analysis.gauges.gauge import MISSES, REGIONS, TITLES, Gauge, Kind
 from analysis.report.units import NONE, digits
 
 if TYPE_CHECKING:
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 COLUMNS = ("kind", "value", "sigma", "nominal", "tolerance", "verdict", "error", "error / sigma")
 MARKS = {"pass": "✓\u00a0pass", "fail": "✗\u00a0fail", "undecided": "?\u00a0undecided"}
 """Never by colour alone."""
-MISSES = "points miss "
-"""How remarks begin that the points are not of the fitted curve, with what else is told before them."""
+UNPROVED = "what does not fit proves neither a pass nor a fail"
+"""Told with the remark of a misfit that has a tolerance."""
 PUT = "ends are the middles of its regions"
 """What remarks hold whose value is for the most part where the regions were put."""
 COUNTED = ("pass", "undecided", "fail", "no tolerance", "none")
@@ -150,6 +150,12 @@ def marked_verdict(row: Mapping[str, Any]) -> str:
     return verdict_text(row["verdict"], row.get("oblique"), row.get("remark") or "")
 
 
+def remark_of(row: Mapping[str, Any]) -> str:
+    """Of such an entry, with why a misfit is undecided whatever its value is."""
+    remark = str(row.get("remark") or "")
+    return f"{remark}; {UNPROVED}" if MISSES in remark and row["verdict"] == "undecided" else remark
+
+
 def label_of(one: Reading, step: str = "") -> str:
     """Of a reading that has a value, for where it is drawn: its name, value and verdict, with what is amiss with it.
 
@@ -220,4 +226,4 @@ def reasons(rows: list[dict[str, Any]]) -> list[str]:
         for row in rows
         if row.get("first_reason") and not row["reason"]
     ]
-    return told + [f"{row['name']}: {text}" for row in rows if (text := row.get("remark")) and not row["reason"]]
+    return told + [f"{row['name']}: {text}" for row in rows if (text := remark_of(row)) and not row["reason"]]

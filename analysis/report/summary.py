@@ -52,10 +52,49 @@ def headline(report: ReportInput) -> str:
         f"{count(found.measured_rows)} of them ({percent(found.completeness)}) were rightly measured by "
         f"{method_name(found.method)}. Against exact ground truth the depth is on average "
         f"{micrometres(abs(depth.bias), 2)} {side} the camera (bias) and scatters about that by "
-        f"{micrometres(depth.sigma)} (standard deviation), {micrometres(depth.rmse)} in all (RMSE). "
+        f"{micrometres(depth.sigma)} (standard deviation), {micrometres(depth.rmse)} in all (RMSE)"
+        f"{_without_outliers(found)}. "
         f"95 % of the points{' in a sample' if found.sampled else ''} lie within {micrometres(found.surface.p95)} of "
         "the true surface, as distances from it and not depths."
     )
+
+
+def _without_outliers(found: Total) -> str:
+    """What the figures of an opening sentence would be, where a few points make them."""
+    if not ruled(found):
+        return ""
+    return f"; a few points rule these: most scatter by {micrometres(found.depth_z.robust_sigma)} (robust sigma)"
+
+
+def ruled(found: Total) -> bool:
+    """The RMSE of the depth is far beyond what most points err by, all alike and each on its own: a few make it."""
+    usual = np.hypot(found.depth_z.median, found.depth_z.robust_sigma)
+    return bool(found.depth_z.rmse > DOMINATED * usual)
+
+
+def tiles(found: Total) -> list[tuple[str, str, str]]:
+    """Name, value and note of the figures that a report begins with; those without outliers first, where these rule."""
+    if found.measured_rows == 0:
+        return []
+    depth, of_sample = found.depth_z, " (sample)" if found.sampled else ""
+    if ruled(found):
+        few = counted(found.outliers, "outlier") if found.outliers else "its largest errors"
+        spread = [
+            ("Depth robust sigma", micrometres(depth.robust_sigma), f"without {few}{of_sample}"),
+            ("Depth median", micrometres(depth.median, 2), f"+ is too far; mean {micrometres(depth.bias, 2)}"),
+            ("Depth RMSE", micrometres(depth.rmse), f"ruled by {few}"),
+        ]
+    else:
+        spread = [
+            ("Depth RMSE", micrometres(depth.rmse), f"{found.u.rmse:.3f} px in the image"),
+            ("Depth bias", micrometres(depth.bias, 2), "+ is too far"),
+            ("Depth sigma", micrometres(depth.sigma), f"robust {micrometres(depth.robust_sigma)}{of_sample}"),
+        ]
+    return [
+        *spread,
+        ("Off the surface", micrometres(found.surface.p95), f"95 % are nearer{of_sample}"),
+        ("Complete", percent(found.completeness), f"{count(found.points)} points"),
+    ]
 
 
 def scale_head(image_scale: float) -> str:
@@ -121,9 +160,7 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
             f"{counted(found.depthless_rows, 'false scan line')} {carry} a peak whose ray gives no depth, and so no "
             "point: it is of stray light or noise."
         )
-    # what most points err by, all alike and each on its own
-    usual = np.hypot(found.depth_z.median, found.depth_z.robust_sigma)
-    dominated = found.depth_z.rmse > DOMINATED * usual
+    dominated = ruled(found)
     if found.u.outlier_rate > 0.002:
         said.append(
             f"{percent(found.u.outlier_rate)} of the points are outliers in the image, {WRONG}: a wrong peak, "

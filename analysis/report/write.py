@@ -13,7 +13,7 @@ import numpy as np
 from analysis.report import calibration, gauge_table, plain_picture
 from analysis.report.colour import method_colour, method_name
 from analysis.report.columns import columns, sentence_height, table_height
-from analysis.report.error_figures import error_map_figure, methods_figure, nice_limit, scene_figure, steps_figure
+from analysis.report.error_figures import error_limit, error_map_figure, methods_figure, scene_figure, steps_figure
 from analysis.report.frame_result import FrameResult
 from analysis.report.front import front
 from analysis.report.glossary import GLOSSARY
@@ -23,7 +23,7 @@ from analysis.report.model import ReportInput
 from analysis.report.page import page_of
 from analysis.report.picture import Drawing
 from analysis.report.style import plain
-from analysis.report.summary import headline, remarks, sample_note
+from analysis.report.summary import headline, remarks, sample_note, tiles
 from analysis.report.tables import (
     MEASURE_COLUMNS,
     counts,
@@ -34,8 +34,8 @@ from analysis.report.tables import (
     timing,
 )
 from analysis.report.terms import TERM_COLUMNS, term_tables
-from analysis.report.total import Total, total
-from analysis.report.units import count, micrometres, percent
+from analysis.report.total import total
+from analysis.report.units import count
 from analysis.report.view import cloud_view, placed_vertices, scene_view
 from render.base.files import atomic_write
 
@@ -74,7 +74,7 @@ def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None
     record = report.record
     frame, found = record.shown_frame(), total(record.chosen())
     view, cloud, error = cloud_view(report)
-    limit = nice_limit(error)
+    limit = error_limit(error)
     scene = scene_view(report, frame)
     vertices = placed_vertices(report, frame.step)
     header, rows, cut = step_table(report)
@@ -106,7 +106,7 @@ def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None
         "facts": _facts(report),
         "chips": laser_chips(report),
         "headline": headline(report),
-        "tiles": _tiles(found),
+        "tiles": tiles(found),
         "remarks": [
             *dict.fromkeys((*report.notes, *remarks(found, report.image_scale))),
             *filter(None, [sample_note(found)]),
@@ -190,19 +190,6 @@ def _when(created: str) -> str:
     except ValueError:
         return created
     return f"{at.day} {at:%B %Y, %H:%M}"
-
-
-def _tiles(found: Total) -> list[tuple[str, str, str]]:
-    if found.measured_rows == 0:
-        return []
-    depth, of_sample = found.depth_z, " (sample)" if found.sampled else ""
-    return [
-        ("Depth RMSE", micrometres(depth.rmse), f"{found.u.rmse:.3f} px in the image"),
-        ("Depth bias", micrometres(depth.bias, 2), "+ is too far"),
-        ("Depth sigma", micrometres(depth.sigma), f"robust {micrometres(depth.robust_sigma)}{of_sample}"),
-        ("Off the surface", micrometres(found.surface.p95), f"95 % are nearer{of_sample}"),
-        ("Complete", percent(found.completeness), f"{count(found.points)} points"),
-    ]
 
 
 def _repeat(report: ReportInput) -> list[tuple[str, str]]:

@@ -169,7 +169,9 @@ def judged_over_steps(gauge: Gauge, found: Sequence[Reading]) -> dict[str, Any]:
 
 def verdict_counts(gauge: Gauge, found: Iterable[Reading]) -> dict[str, int]:
     """How many readings come to which verdict by the tolerance of a gauge that reads as theirs; none: not measured."""
-    told = ("none" if one.reason else gauge.verdict(one.value, one.sigma) or "no tolerance" for one in found)
+    told = (
+        "none" if one.reason else gauge.verdict(one.value, one.sigma, one.remark) or "no tolerance" for one in found
+    )
     return dict(sorted(Counter(told).items()))
 
 

@@ -205,7 +205,7 @@ class RowProfile(QWidget):
         valid = np.flatnonzero(line.valid[index])
         if not len(valid):
             reason = REASONS.get(Flag(int(line.flag[index, 0])), "no position")
-            return f"<span style='color:{colour}'>{method_name(method)}: {reason}</span>"
+            return f"<span style='color:{colour}'>{method_name(method)} finds no line: {reason}</span>"
         u, width = float(line.u[index, valid[0]]), float(line.width[index, valid[0]])
         if np.isfinite(width):
             x = np.linspace(u - 5 * width, u + 5 * width, 201)
@@ -214,7 +214,8 @@ class RowProfile(QWidget):
                 self._add(pg.PlotCurveItem(x, y, pen=pg.mkPen(colour, width=1.6)))
                 self._top = max(self._top, float(y.max()))
         off = round(u - float(true[np.argmin(np.abs(true - u))]), 3) if len(true) else 0.0
-        error = f" {off + 0.0:+.3f} px" if len(true) else ": no line is seen here"
+        # what is found and has no truth may be of a line all the same, as beside an edge
+        error = f" {off + 0.0:+.3f} px" if len(true) else f" {u:.3f} px, no truth here to compare with"
         caution = CAUTIONS.get(Flag(int(line.flag[index, valid[0]])), "")
         return f"<span style='color:{colour}'>{method_name(method)}{error}{caution and f', {caution}'}</span>"
 

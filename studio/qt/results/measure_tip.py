@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from analysis.gauges.gauge import TITLES, Gauge
-from analysis.report.gauge_table import DEFINITIONS, cells, over_steps_of, value_text
+from analysis.report.gauge_table import DEFINITIONS, cells, over_steps_of, remark_of, value_text
 from analysis.report.units import NONE
 
 
@@ -21,7 +21,7 @@ def measure_tip(gauge: Gauge, entry: Mapping[str, Any] | None, of: str) -> str:
         else:
             truth = value_text(entry["truth"], entry["sigma"], gauge.unit)
             in_sigmas = "" if ratio == NONE else f" ({ratio} sigma)"
-            told += [f"truth {truth}; {entry['points']} points{in_sigmas}", first_upper(entry["remark"])]
+            told += [f"truth {truth}; {entry['points']} points{in_sigmas}", first_upper(remark_of(entry))]
     return "".join(f"<p>{text}</p>" for text in told if text)
 
 

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, marked_verdict, missing_of
+from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, marked_verdict, missing_of, remark_of
 from analysis.report.units import NONE
 from studio.project.same_lasers import same_lasers
 from studio.qt.core import theme
@@ -336,7 +336,7 @@ class PartTab(QWidget):
         elif gauge is not None and (odd := beside_nominal(gauge, None if entry is None else entry["value"])):
             text = odd
         elif entry is not None and entry["remark"]:
-            text = first_upper(f"{entry['remark']}.")
+            text = first_upper(f"{remark_of(entry)}.")
         elif self.readings and (render := self.session.shown) is not None:
             text = lean_text(render.project.scene, self.laser, render.frame.step, self.session.project.measured_in)
         if self._read and self.placing is None:

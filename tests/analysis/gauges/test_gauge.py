@@ -8,8 +8,16 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from analysis.gauges.gauge import Gauge
+from analysis.gauges.gauge import MISSES, Gauge
 from tests.analysis.gauges.profiles import gauge
+
+
+@pytest.mark.parametrize("value", [11.0, 20.0])
+def test_what_the_curve_does_not_fit_is_neither_within_nor_without(value: float) -> None:
+    """A measure on another part than its own was a pass by its one limit."""
+    one = gauge("step", nominal=11.0, lower=-0.5, upper=0.5)
+    assert one.verdict(value, 0.08, f"{MISSES}the curve") == "undecided" != one.verdict(value, 0.08, "another remark")
+    assert gauge("step", nominal=11.0).verdict(value, 0.08, f"{MISSES}the curve") is None
 
 
 @pytest.mark.parametrize(

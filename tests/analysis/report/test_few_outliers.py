@@ -7,8 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from analysis.report.summary import remarks
+from analysis.report.model import ReportInput
+from analysis.report.summary import headline, remarks, tiles
 from analysis.report.total import total
+from analysis.report.units import micrometres
 from tests.analysis.report.test_report import extraction, make_frames, report_of
 
 STEPS = 12
@@ -16,13 +18,17 @@ STEPS = 12
 
 
 def remarks_with_outliers(outliers: int, size_px: float) -> list[str]:
+    return remarks(total(with_outliers(outliers, size_px).record.chosen()))
+
+
+def with_outliers(outliers: int, size_px: float) -> ReportInput:
     scene, frames = make_frames(steps=STEPS)
     noise = 0.1 * np.random.default_rng(2).standard_normal(100)
     noise[:outliers] = size_px
     laser = frames[0].lasers[0]
     changed = dataclasses.replace(laser, extractions=(extraction(scene, laser.curve, 0, "likelihood", noise),))
     frames[0] = dataclasses.replace(frames[0], lasers=(changed,))
-    return remarks(total(report_of(scene, frames).record.chosen()))
+    return report_of(scene, frames)
 
 
 @pytest.mark.parametrize(
@@ -33,6 +39,25 @@ def test_outliers_that_make_the_rmse_are_told(outliers: int, size_px: float, tol
     said = " ".join(remarks_with_outliers(outliers, size_px))
     assert ("outlier" in said) == bool(told)
     assert told in said
+
+
+@pytest.mark.parametrize(("outliers", "few"), [(1, "1 outlier"), (2, "2 outliers")])
+def test_a_report_begins_with_the_usual_error_where_outliers_make_the_rmse(outliers: int, few: str) -> None:
+    """It began with an RMSE of 1265 um and a bias of a few gross outliers; 20.6 um stood small below."""
+    report = with_outliers(outliers, 20.0)
+    depth = (found := total(report.record.chosen())).depth_z
+    first, second, third = tiles(found)[:3]
+    assert first == ("Depth robust sigma", micrometres(depth.robust_sigma), f"without {few}")
+    assert second[:2] == ("Depth median", micrometres(depth.median, 2)) and micrometres(depth.bias, 2) in second[2]
+    assert third == ("Depth RMSE", micrometres(depth.rmse), f"ruled by {few}")
+    assert f"most scatter by {micrometres(depth.robust_sigma)} (robust sigma)" in headline(report)
+
+
+@pytest.mark.parametrize(("outliers", "size_px"), [(0, 0.0), (1, 1.5)])
+def test_a_report_begins_with_the_rmse_where_all_points_make_it(outliers: int, size_px: float) -> None:
+    report = with_outliers(outliers, size_px)
+    names = [name for name, _, _ in tiles(total(report.record.chosen()))]
+    assert names[:3] == ["Depth RMSE", "Depth bias", "Depth sigma"] and "rule" not in headline(report)
 
 
 def test_a_bias_that_all_points_have_is_not_laid_to_outliers() -> None:

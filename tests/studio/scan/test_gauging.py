@@ -15,7 +15,7 @@ from click.testing import CliRunner
 import main
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.read import MISFITS, OTHER_SHAPE, Reading
-from analysis.report.gauge_table import cells, missing_of, over_steps, reasons, worst_of
+from analysis.report.gauge_table import UNPROVED, cells, missing_of, over_steps, reasons, worst_of
 from analysis.report.units import NONE
 from render.base.errors import InputError
 from render.run import Run
@@ -112,14 +112,18 @@ def table(folder: Path) -> list[dict[str, str]]:
 
 @pytest.mark.parametrize("remark", [OTHER_SHAPE, *MISFITS.values()])
 def test_points_that_miss_the_curve_are_marked_beside_the_verdict_in_the_report(remark: str) -> None:
-    """The remark stood below the table, and the row had a pass like any other."""
+    """The remark stood below the table, and the row had a pass like any other, which a misfit cannot prove."""
     gauge = Gauge(name="a", kind="peak", regions=((-0.3, -0.1), (0.0, 0.3)), nominal=0.2, upper=0.1)
     told = f"the section crosses its faces 13.0° obliquely; {remark.format(63.0)}"
     one = Reading(gauge, 0, value=0.2, sigma_random=1e-5, sigma_systematic=0.0, remark=told)
-    assert cells(judged_over_steps(gauge, [one]))[5] == "✓\u00a0pass, misfit"
+    for value in (0.2, 0.5):
+        row = judged_over_steps(gauge, [replace(one, value=value)])
+        assert cells(row)[5] == "?\u00a0undecided, misfit" and row["verdicts"] == {"undecided": 1}
+        assert reasons([row])[0].endswith(f"times their sigma{remark.partition('sigma')[2]}; {UNPROVED}")
     assert cells(judged_over_steps(gauge, [replace(one, remark="")]))[5] == "✓\u00a0pass"
     bare = replace(one, gauge=gauge.model_copy(update={"nominal": None, "upper": None}))
-    assert cells(judged_over_steps(bare.gauge, [bare]))[5] == "misfit"
+    row = judged_over_steps(bare.gauge, [bare])
+    assert cells(row)[5] == "misfit" and UNPROVED not in reasons([row])[0]
 
 
 def test_an_oblique_section_stands_beside_the_verdict_in_the_report() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QPointF, Qt
@@ -212,7 +214,24 @@ def test_a_row_without_a_position_says_why(qtbot, made):
     empty = np.flatnonzero(~line.valid[:, 0])
     assert len(empty) > 0
     made.session.hover(int(empty[0]))
-    assert REASONS[Flag(int(line.flag[empty[0], 0]))] in made.profile.text.text()
+    assert f"finds no line: {REASONS[Flag(int(line.flag[empty[0], 0]))]}" in made.profile.text.text()
+    assert "no truth here" not in made.profile.text.text()
+
+
+def test_a_line_that_has_no_truth_is_not_said_to_be_none(qtbot, made):
+    """Beside a step's edge "no line is seen here" stood under a fitted peak that the results had a depth of."""
+    shown = made.session.shown
+    line, curve = shown.measurements["likelihood"][0].line, shown.frame.curves[0]
+    row = int(np.flatnonzero(line.valid[:, 0])[40])
+    made.session.hover(row)
+    assert "no truth here" not in made.profile.text.text()
+    there = curve.index != row
+    of_rows = {field.name: getattr(curve, field.name) for field in dataclasses.fields(curve)}
+    kept = {k: v[there] for k, v in of_rows.items() if isinstance(v, np.ndarray) and len(v) == len(there)}
+    shown.frame = dataclasses.replace(shown.frame, curves=(dataclasses.replace(curve, **kept),))
+    made.profile.refresh()
+    told = made.profile.text.text()
+    assert f"{line.u[row, 0]:.3f} px, no truth here to compare with" in told and "no line" not in told
 
 
 def test_lines_of_each_method_are_switched_on_their_own(qtbot, made):

@@ -10,10 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QColor
 from pytestqt.qtbot import QtBot
 
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.read import OTHER_SHAPE
+from analysis.report.gauge_table import UNPROVED
+from studio.qt.core import theme
 from studio.qt.core.session import Session
 from studio.qt.results.plots import PointedPlots
 from studio.qt.results.results_panel import PART, REGION, ResultsPanel
@@ -320,7 +323,10 @@ def test_an_oblique_section_stands_beside_the_verdict(panel: ResultsPanel) -> No
     assert texts(panel, 0)[-1].endswith("fail, 13.0° oblique") and "square to them it is" in panel.part.told.text()
     panel.part.readings = (replace(panel.part.readings[0], oblique=np.nan, remark=OTHER_SHAPE.format(63.0)),)
     panel.part._show()
-    assert texts(panel, 0)[-1].endswith("fail, misfit") and "by 63 times" in panel.part.table.item(0, 4).toolTip()
+    item = panel.part.table.item(0, 4)
+    assert texts(panel, 0)[-1].endswith("undecided, misfit") and "by 63 times" in item.toolTip()
+    assert UNPROVED in item.toolTip() and UNPROVED in panel.part.told.text()
+    assert item.foreground().color() == QColor(theme.colours().warning)
 
 
 def test_the_hint_names_the_list_of_sections(panel: ResultsPanel) -> None:
