@@ -48,7 +48,8 @@ class Lens(Model):
         None,
         unit="m",
         label="Focus distance",
-        help="Empty: far away. Focusing leaves the image distance, and so fx.",
+        help="Empty: far away. Focused here, the lens keeps its focal length, and image distance, fx and fy follow; a "
+        "study that varies it keeps fx.",
         ge=1e-3,
         le=1e6,
     )

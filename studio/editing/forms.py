@@ -26,7 +26,7 @@ from render.scene.motion import PoseList
 from render.scene.scene import Scene, SceneObject
 from render.scene.settings import RenderSettings
 from render.sensor.sensor import Sensor, SpectralCurve
-from studio.editing.linked_fields import DERIVED, LINKED
+from studio.editing.linked_fields import DERIVED, FOCUS, LINKED, with_focus
 from studio.editing.units import FACTORS, Unit
 from studio.project.document import FieldPath, replaced, value_at
 from studio.project.project import Project
@@ -185,12 +185,14 @@ def _with_objects(project: Project, spec: FieldSpec) -> FieldSpec:
 
 def edited(project: Project, owner: FieldPath, spec: FieldSpec, value: Any) -> Project:
     """The project with one field of the model at `owner` changed, and what is linked to it. InputError: refused."""
-    if spec.assign is None:
-        return replaced(project, field_path(owner, spec), value)
+    path = field_path(owner, spec)
+    owner, assign = (path[:-2], with_focus) if path == FOCUS else (owner, spec.assign)
+    if assign is None:
+        return replaced(project, path, value)
     model = value_at(project, owner)
     # as plain fields, so that they are validated together
     fields = {name: getattr(model, name) for name in type(model).model_fields}
-    return replaced(project, owner, fields | spec.assign(model, value))
+    return replaced(project, owner, fields | assign(model, value))
 
 
 def field_path(owner: FieldPath, spec: FieldSpec) -> FieldPath:

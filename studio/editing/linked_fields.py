@@ -68,6 +68,27 @@ def with_focal_length(camera: Camera, value: float) -> dict[str, Any]:
     return with_image_distance(camera, value * focus / (focus - value))
 
 
+def with_focus(camera: Camera, value: float | None) -> dict[str, Any]:
+    """The lens focused at a distance (m; None: far away) as by its ring: its focal length stays, so fx and fy follow.
+
+    InputError: it is no farther away than the focal length.
+    """
+    if value == camera.lens.focus_distance:
+        return {}  # rounding would change fx
+    focal_length = camera.focal_length
+    if value is not None and value <= focal_length:
+        raise InputError(
+            "a lens of this focal length is not focused there",
+            where="focus distance of the camera",
+            found=f"{1e3 * value:.4g} mm",
+            allowed=f"more than the focal length, {1e3 * focal_length:.4g} mm",
+        )
+    image_distance = focal_length if value is None else value * focal_length / (value - focal_length)
+    # as plain fields, so that the lens is validated with the camera
+    lens = {name: getattr(camera.lens, name) for name in type(camera.lens).model_fields} | {"focus_distance": value}
+    return {"lens": lens} | with_image_distance(camera, image_distance)
+
+
 def with_width(camera: Camera, value: int) -> dict[str, Any]:
     """A centred principal point stays centred."""
     centred = abs(camera.cx - (camera.width - 1) / 2) < 1e-6
@@ -107,6 +128,8 @@ def _combined(curves: tuple[SpectralCurve, ...], operation: np.ufunc) -> Spectra
     return SpectralCurve(wavelength_nm=tuple(knots), value=values)
 
 
+FOCUS = ("scene", "rig", "camera", "lens", "focus_distance")
+"""Where a project has the distance whose change by a person is `with_focus` of the camera."""
 LINKED: dict[tuple[type[BaseModel], str], Assign] = {
     (Camera, "width"): with_width,
     (Camera, "height"): with_height,
@@ -119,8 +142,8 @@ DERIVED: dict[type[BaseModel], tuple[Derived, ...]] = {
             "focal_length",
             "Focal length",
             "Of the lens, by image distance and focus distance: 1/f = 1/image distance + 1/focus distance. Typing it "
-            "sets the image distance, with fx and fy. Focusing keeps the image distance, as a calibrated camera keeps "
-            "its geometry, so that this one follows.",
+            "sets the image distance, with fx and fy. Focusing keeps it, as turning a lens's ring does, and the image "
+            "distance follows.",
             "m",
             "fx",
             lambda camera: camera.focal_length,
@@ -130,8 +153,8 @@ DERIVED: dict[type[BaseModel], tuple[Derived, ...]] = {
         Derived(
             "image_distance",
             "Image distance",
-            "From the lens to the sensor: fx times the pixel pitch; typing it sets fx and fy. Where the lens is "
-            "focused far away it is the focal length.",
+            "From the lens to the sensor: fx times the pixel pitch; typing it sets fx and fy, as a calibration "
+            "measures them, and with them the focal length, which it is where the lens is focused far away.",
             "m",
             "fx",
             lambda camera: camera.image_distance,

@@ -78,7 +78,7 @@ def _tried(
     key: str, look: Look, laser: int, now: Readouts, look_at: Callable[[Project], Look]
 ) -> Iterator[tuple[Change, Readouts]]:
     """Changes with what is read then: each as it is, and exposed anew where it saturates or is worse elsewhere."""
-    for label, project in changes(key, look, laser, now):
+    for label, project in changes(key, look, laser, now, look_at):
         then = readouts(look_at(project), laser)
         yield (label, project), then
         saturates = then.saturated is not None and then.saturated > SATURATED

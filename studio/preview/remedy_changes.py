@@ -8,17 +8,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float
 from render.base.errors import InputError
+from render.frame import LaserCurve
 from render.laser.laser import Waist
 from render.sensor.sensor import BandPass
+from studio.editing.linked_fields import FOCUS, with_focus
 from studio.editing.placement import working_distance
 from studio.editing.placing import aimed, at_angle
 from studio.editing.units import Unit
 from studio.preview.estimates import SHARP_PX, dioptre_px
 from studio.preview.focusing import between
 from studio.preview.inspection import NARROW_PX, WIDE_PX
-from studio.preview.preview import Look
+from studio.preview.preview import Look, Mask
 from studio.preview.readout_rows import SATURATED
 from studio.preview.readouts import RARE, Range, Readouts
 from studio.preview.saturation import brightest
@@ -33,29 +36,34 @@ LEAST_OCCLUDED = 12.0
 """Degrees, somewhat above those at which depth is coarse."""
 UNFOCUSED = 0.25
 """Of the blur, what is left at best focus, below which the lens is focused before it is stopped down."""
+TURNS = 6
+"""Times a laser is turned until the angle is read that is wanted."""
+TURNED = math.radians(0.05)
+"""From which an angle is not told as the wanted one."""
 STOPS = (1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0)
 Change = tuple[str, Project]
 """What is done, and the project with it."""
 EXPOSURE: FieldPath = ("sensor", "exposure_time")
 FILTER: FieldPath = ("sensor", "band_pass")
-LENS: FieldPath = ("scene", "rig", "camera", "lens")
+CAMERA: FieldPath = ("scene", "rig", "camera")
+LENS: FieldPath = (*CAMERA, "lens")
 
 
 class Step(NamedTuple):
-    """A field's new value, and how it is told."""
+    """A field's new value, and how it is told; empty: with the step before."""
 
     told: str
     path: FieldPath
     value: object
 
 
-def changes(key: str, look: Look, laser: int, now: Readouts) -> Iterator[Change]:
-    """What may help the read-out of a row's key; what no project may have is left out."""
+def changes(key: str, look: Look, laser: int, now: Readouts, look_at: Callable[[Project], Look]) -> Iterator[Change]:
+    """What may help the read-out of a row's key; what no project may have is left out. look_at: as of `remedies`."""
     tries = {
         "peak": (_exposed, _powered, _filtered),
         "saturated": (_exposed, _filtered),
-        "angle": tuple(_turned(angle) for angle in ANGLES),
-        "occluded": tuple(_turned(angle) for angle in (*ANGLES[1:], LEAST_OCCLUDED)),
+        "angle": tuple(_turned(angle, look_at) for angle in ANGLES),
+        "occluded": tuple(_turned(angle, look_at) for angle in (*ANGLES[1:], LEAST_OCCLUDED)),
         "working": (_aimed,),
         "width": (_sheet, _waist),
         "blur": (_focused, _stopped_down, _stopped_down_and_filled),
@@ -86,11 +94,25 @@ def _filling(now: Readouts, lifted: float) -> float | None:
 
 
 def lit_point(look: Look, laser: int) -> Float:
-    """(3,) the middle of the lit line in the rig's frame; where there is none, of the camera's axis in its range."""
+    """(3,) in the rig's frame, that stays lit when the laser turns about it.
+
+    The middle one of the line on the part, in the order along the fan; where there is no line, the camera's axis in the
+    working distance. A median of each coordinate would be on the table, beneath a part that is narrower than its half.
+    """
     T_rig_camera = look.scene.camera.T_rig_camera.matrix
-    points = look.lit(laser).curve.point
-    point = np.median(points, axis=0) if len(points) else np.array([0.0, 0.0, working_distance(look.scene)])
-    return np.asarray(T_rig_camera[:3, :3] @ point + T_rig_camera[:3, 3])
+    curve = look.lit(laser).curve
+    if not len(curve.point):
+        return np.asarray((T_rig_camera @ [0.0, 0.0, working_distance(look.scene), 1.0])[:3])
+    points = curve.point[_on_part(curve)] @ T_rig_camera[:3, :3].T + T_rig_camera[:3, 3]
+    along = points @ look.scene.lasers[laser].T_rig_laser.matrix[:3, 1]
+    return np.asarray(points[np.argsort(along)[len(along) // 2]])
+
+
+def _on_part(curve: LaserCurve) -> Mask:
+    """(n,) points of all that is lit but the farthest object, on which the others stand; of a single one all."""
+    depths = {int(item): float(np.median(curve.depth_z[curve.object_id == item])) for item in set(curve.object_id)}
+    everything = np.ones(len(curve.object_id), dtype=np.bool_)
+    return everything if len(depths) < 2 else curve.object_id != max(depths, key=lambda item: depths[item])
 
 
 def _exposed(look: Look, laser: int, now: Readouts) -> Change | None:
@@ -117,18 +139,46 @@ def _filtered(look: Look, laser: int, now: Readouts) -> Change | None:
     return _changed(look.project, Step(told, FILTER, chosen))
 
 
-def _turned(degrees: float) -> Callable[[Look, int, Readouts], Change | None]:
+def _turned(degrees: float, look_at: Callable[[Project], Look]) -> Callable[[Look, int, Readouts], Change | None]:
+    """About the middle of the line on the part, which stays lit there; told is the angle that is read then."""
+
     def change(look: Look, laser: int, now: Readouts) -> Change | None:
-        if now.triangulation_angle is None:
+        wanted = math.radians(degrees)
+        turned = None if now.triangulation_angle is None else _read_as(wanted, look, laser, look_at)
+        if now.triangulation_angle is None or turned is None:
             return None
-        scene = look.project.scene
-        before, camera = scene.lasers[laser].T_rig_laser, scene.camera.T_rig_camera.matrix[:3, 3]
-        pose = at_angle(before, camera, lit_point(look, laser), math.radians(degrees))
-        path: FieldPath = (*_laser(laser), "T_rig_laser")
-        angle = _from_to("rad", now.triangulation_angle.middle, math.radians(degrees))
-        return _changed(look.project, Step(f"move the laser: triangulation angle {angle}", path, pose))
+        found, step = turned
+        read = wanted if abs(found - wanted) < TURNED else math.radians(float(f"{math.degrees(found):.3g}"))
+        told = f"move the laser: triangulation angle {_from_to('rad', now.triangulation_angle.middle, read)}"
+        return _changed(look.project, step._replace(told=told))
 
     return change
+
+
+def _read_as(wanted: float, look: Look, laser: int, look_at: Callable[[Project], Look]) -> tuple[float, Step] | None:
+    """The pose at which the angle read comes nearest to one, rad, and what is read; None: the line is lost.
+
+    Read is the median of a line that runs beside the part as well, where the angle is another one.
+    """
+    scene, asked, best = look.project.scene, wanted, None
+    before, camera, point = scene.lasers[laser].T_rig_laser, scene.camera.T_rig_camera.matrix, lit_point(look, laser)
+    path: FieldPath = (*_laser(laser), "T_rig_laser")
+    for _ in range(TURNS):
+        step = Step("", path, at_angle(before, camera[:3, 3], point, asked))
+        found = _angle(look_at(replaced(look.project, path, step.value)), laser)
+        if found is not None and (best is None or abs(found - wanted) < abs(best[0] - wanted)):
+            best = found, step
+        if found is None or abs(found - wanted) < TURNED:
+            break
+        asked = min(max(asked + wanted - found, 0.5 * wanted), 1.5 * wanted)
+    return best
+
+
+def _angle(look: Look, laser: int) -> float | None:
+    """Of triangulation, rad, the median of the line; None: there is none."""
+    curve, camera = look.lit(laser).curve, look.scene.camera.T_rig_camera.matrix
+    origin = look.scene.lasers[laser].T_rig_laser.matrix[:3, 3] - camera[:3, 3]
+    return float(np.median(triangulation_angles(curve.point, origin @ camera[:3, :3]))) if len(curve.point) else None
 
 
 def _aimed(look: Look, laser: int, now: Readouts) -> Change | None:
@@ -182,7 +232,7 @@ def _laser_focus(look: Look, laser: int) -> Step | None:
 
 def _focused(look: Look, laser: int, now: Readouts) -> Change | None:
     """On the depth whose vergence is in the middle of the line's."""
-    return None if now.distance is None else _changed(look.project, _focus(look.project, now.distance))
+    return None if now.distance is None else _changed(look.project, *_focus(look.project, now.distance))
 
 
 def _stopped_down(look: Look, laser: int, now: Readouts) -> Change | None:
@@ -227,11 +277,18 @@ def _stopped(project: Project, now: Readouts, number: float, times: float) -> Ch
     before = project.scene.camera.lens.f_number
     aperture = Step(f"f/{before:g} → f/{number:g}", (*LENS, "f_number"), number)
     exposure = _exposed_by(project, times * (number / before) ** 2)
-    return _changed(project, aperture, _focus(project, now.distance), exposure)
+    return _changed(project, aperture, *_focus(project, now.distance), exposure)
 
 
-def _focus(project: Project, distance: Range) -> Step | None:
-    return _number(project, "focus", (*LENS, "focus_distance"), "m", between(distance.low, distance.high))
+def _focus(project: Project, distance: Range) -> tuple[Step, ...]:
+    """As by the ring of the lens, whose focal length stays: the image distance follows, and fx and fy with it."""
+    focus = between(distance.low, distance.high)
+    step = _number(project, "focus", FOCUS, "m", focus)
+    if step is None:
+        return ()
+    found = with_focus(project.scene.camera, focus)
+    kept = Step("focal length kept", (*CAMERA, "fx"), found["fx"])
+    return step, kept, Step("", (*CAMERA, "fy"), found["fy"])
 
 
 def _exposed_by(project: Project, times: float) -> Step | None:
@@ -249,7 +306,7 @@ def _changed(project: Project, *steps: Step | None) -> Change:
     taken = [step for step in steps if step is not None]
     for step in taken:
         project = replaced(project, step.path, step.value)
-    return ", ".join(step.told for step in taken), project
+    return ", ".join(step.told for step in taken if step.told), project
 
 
 def _from_to(unit: str, before: float | None, after: float, shown: str = "") -> str:

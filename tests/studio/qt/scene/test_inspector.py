@@ -109,8 +109,15 @@ class TestTyping:
         qtbot.mouseClick(vignetting, Qt.MouseButton.LeftButton, pos=QPoint(8, vignetting.height() // 2))
         assert not session.project.scene.camera.lens.vignetting
         focus = field(inspector, *CAMERA, "lens", "focus_distance")
+        before = session.project.scene.camera
         type_into(qtbot, focus, "900")
-        assert session.project.scene.camera.lens.focus_distance == pytest.approx(0.9)
+        camera = session.project.scene.camera
+        assert camera.lens.focus_distance == pytest.approx(0.9)
+        assert camera.focal_length == pytest.approx(before.focal_length)
+        assert float(field(inspector, *CAMERA, "fx").text()) == pytest.approx(camera.fx, abs=1e-3)
+        session.document.undo()
+        assert session.project.scene.camera == before, "fx and focus are one step"
+        session.document.redo()
         qtbot.mouseClick(row(inspector, *CAMERA, "lens", "focus_distance").reset, Qt.MouseButton.LeftButton)
         assert session.project.scene.camera.lens.focus_distance is None
         assert (focus.text(), focus.placeholderText()) == ("", "far away")
