@@ -20,7 +20,8 @@ from studio.qt.core.render import Render
 from studio.qt.core.session import Session
 from studio.qt.image.camera_view import CameraView
 from studio.qt.render.develop_panel import DevelopPanel
-from studio.scan.stages import scaled
+from studio.scan.redevelop import develop_again, development, measure_again
+from studio.scan.stages import Measurement, scaled
 
 FOLDER = template_folder("sphere")
 
@@ -38,6 +39,14 @@ def small_render() -> tuple[World, Frame]:
     settings = project.render.model_copy(update={"ambient_samples": 4})
     run = Run(seed=project.seed)
     return world, render_world(world, project.scene, settings=settings, axis=project.extraction.axis, run=run)
+
+
+@lru_cache(maxsize=1)
+def small_measurements() -> dict[str, list[Measurement]]:
+    project, (world, frame) = small_project(), small_render()
+    how = development(project, project)
+    images = develop_again(frame, how)
+    return measure_again(frame, world, how, images, ("likelihood",), cancelled=lambda: False)
 
 
 def small_session(rendered: bool = False) -> Session:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +20,9 @@ from studio.qt.core.session import Session
 from studio.qt.results.plots import PointedPlots
 from studio.qt.results.results_panel import PART, REGION, ResultsPanel
 from studio.scan.gauging import readings
-from studio.scan.redevelop import develop_again, development, measure_again
 from studio.scan.region import Region
 from studio.scan.sheet_lean import sheet_lean
-from studio.scan.stages import Measurement
-from tests.studio.qt.small_session import small_project, small_render, small_session
+from tests.studio.qt.small_session import small_measurements, small_session
 
 SIDES = ((-0.25, -0.15), (0.15, 0.25))
 """m, of the ground beside the sphere."""
@@ -33,21 +30,12 @@ SELDOM_MS = 20
 """Between two moves of the mouse: a scene leaves out those that follow within 10 ms."""
 
 
-@lru_cache(maxsize=1)
-def measured() -> dict[str, list[Measurement]]:
-    """Of the small sphere."""
-    project, (world, frame) = small_project(), small_render()
-    how = development(project, project)
-    images = develop_again(frame, how)
-    return measure_again(frame, world, how, images, ("likelihood",), cancelled=lambda: False)
-
-
 @pytest.fixture
 def panel(qtbot: QtBot) -> ResultsPanel:
     """The small sphere, measured, on the screen."""
     session = small_session(rendered=True)
     assert session.shown is not None
-    session.shown.measurements = measured()
+    session.shown.measurements = small_measurements()
     made = ResultsPanel(session)
     qtbot.addWidget(made)
     made.resize(1366, 420)
