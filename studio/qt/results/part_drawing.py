@@ -107,5 +107,7 @@ class PartDrawing(QObject):
 
 
 def _filled(line: Float) -> Float:
-    """(k, 2) places along a line between two; none of an empty one."""
+    """(k, 2) places along a line between two; none of an empty one, as an angle has no dimension."""
+    if not len(line):
+        return line
     return line[:1] + np.linspace(0.0, 1.0, FILLED)[:, None] * (line[-1:] - line[:1])
