@@ -26,6 +26,8 @@ NEARLY_ALONG = math.radians(80.0)
 """More oblique sections show nothing of the faces' shape."""
 NOT_OF_A_BAR = 1e-3
 """Of a unit normal off the plane that a bar's lie in: facets alone turn them by less."""
+LEAST_OBLIQUE = math.radians(0.05)
+"""Changes no dimension by as much as a millionth: what a curve that does not fit changes by it is not the section's."""
 SQUARE = math.radians(0.5)
 """A section that is no farther off is called square."""
 

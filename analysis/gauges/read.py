@@ -14,6 +14,7 @@ from analysis.gauges.edge import NOT_IN_TRUTH, Edge, edge_of
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, Gauge, Verdict
 from analysis.gauges.oblique import (
+    LEAST_OBLIQUE,
     lean_off_a_ball,
     moved_regions,
     oblique_remark,
@@ -177,6 +178,8 @@ def _beside_square(one: Reading, profile: Profile) -> Reading:
         return one
     if along is None:
         return _beside_ball(one, profile, parts[0]) if one.gauge.kind == "radius" else one
+    if obliquity(along) < LEAST_OBLIQUE:
+        return one
     if (square := square_profile(profile, along)) is None:
         return _told(one, oblique_remark(profile, along, ""), obliquity(along))
     regions = moved_regions(one.gauge.regions, parts, profile, square)

@@ -139,3 +139,11 @@ def test_where_the_exact_line_is_not_no_section_is_advised() -> None:
     assert "obliquely" in read(asked, 0, measured, truth).remark
     away = read(asked, 0, measured, truth.taken(np.abs(ACROSS) > 0.018))
     assert away.stray and "list of sections" not in away.remark and math.isnan(away.oblique)
+
+
+def test_what_a_curve_that_does_not_fit_changes_by_is_not_said_to_be_the_sections() -> None:
+    """A radius over a groove was told as 0.0 deg oblique, and 2 % less square to its faces."""
+    height, _ = shape("opening")
+    whole = (float(ACROSS[0]), float(ACROSS[-1]))
+    found = read_through(Gauge(kind="radius", regions=(whole,)), math.radians(0.03), height)
+    assert math.isfinite(found.value) and "obliquely" not in found.remark and math.isnan(found.oblique)
