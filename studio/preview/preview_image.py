@@ -30,6 +30,7 @@ Clear = Callable[[Float, Float, Float], NDArray[np.bool_]]
 
 SCALES = (1.0, 0.5, 1 / 3, 0.25, 0.2, 1 / 6, 1 / 8, 0.1, 1 / 12, 1 / 16, 1 / 24, 1 / 32, 1 / 48, 1 / 64)
 FEWEST_PIXELS = 2000
+ANY_CAMERA = Camera(width=1, height=1, fx=1.0, fy=1.0, cx=0.0, cy=0.0)
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,9 @@ def pixel_rays(width: int, height: int, optics: tuple[float, ...], distortion: t
 @lru_cache(maxsize=4)
 def _pixel_rays(width: int, height: int, optics: tuple[float, ...], distortion: tuple[float, ...]) -> Float:
     fx, fy, cx, cy, skew = optics
-    camera = Camera(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, skew=skew, distortion=distortion)
+    # unchecked, as a scaled camera may have fewer pixels of focal length than one may be set up with
+    values = {"width": width, "height": height, "fx": fx, "fy": fy, "cx": cx, "cy": cy, "skew": skew}
+    camera = ANY_CAMERA.model_copy(update={**values, "distortion": distortion})
     pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(np.float64)
     normalised = camera.normalise(pixels)[0].reshape(-1, 2)
     normalised.flags.writeable = False
