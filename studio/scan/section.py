@@ -112,13 +112,17 @@ def _write_csv(made: Section, path: Path) -> None:
         writer.writerow(SECTION_COLUMNS)
         for number, line in enumerate(made.true):
             for place, world in zip(line.tolist(), made.plane.world(line).tolist(), strict=True):
-                writer.writerow(["true", number, *place, *world, 0.0, "", "", ""])
+                writer.writerow(["true", number, *map(_number, [*place, *world]), "0", "", "", ""])
         worlds = made.plane.world(made.measured).tolist()
         rest = zip(made.sigma.tolist(), made.step.tolist(), made.row.tolist(), strict=True)
         for place, world, numbers in zip(made.measured.tolist(), worlds, rest, strict=True):
-            sigma, step, row = ("" if value != value else value for value in numbers)
-            whole = ["" if value == "" else int(value) for value in (step, row)]
-            writer.writerow(["measured", "", *place[:2], *world, place[2], sigma, *whole])
+            texts = map(_number, [*place[:2], *world, place[2], *numbers])
+            writer.writerow(["measured", "", *texts])
+
+
+def _number(value: float) -> str:
+    """Without the last binary digits, which no point is known to; NaN: empty."""
+    return f"{value:.9g}" if value == value else ""
 
 
 def _pieces(folder: Path) -> list[Cloud]:
