@@ -80,8 +80,8 @@ def percent(value: float, decimals: int = 1) -> str:
 
 
 def grouped(value: float, decimals: int = 0) -> str:
-    """Thousands set apart by thin spaces, as a comma may be a decimal one: "1 820.5"."""
-    return f"{value:,.{decimals}f}".replace(",", "\u2009")
+    """Thousands set apart by thin spaces that no line breaks at, as a comma may be a decimal one: "1 820.5"."""
+    return f"{value:,.{decimals}f}".replace(",", "\u202f")
 
 
 def count(value: float) -> str:

@@ -77,7 +77,9 @@ def deviation(folder: Path, **options: Any) -> None:
 @click.option("--through", type=Place(), required=True, help="A point of the plane, world, mm.")
 @click.option("--normal", type=Place(), required=True, help="Of the plane, any length.")
 @click.option(
-    "--thickness", type=FiniteRange(1e-3, 1e3), default=1.0, show_default=True, help="Of the slab of points, mm."
+    "--thickness",
+    type=FiniteRange(1e-3, 1e3),
+    help="Of the slab of points, mm  [default: 1, or the scan's step where that is more].",
 )
 @click.option("--out", type=click.Path(path_type=Path), help="DXF or CSV  [default: section.dxf in the folder].")
 @common

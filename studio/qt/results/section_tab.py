@@ -24,13 +24,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from analysis.cloud import Cloud
 from analysis.report.colour import TRUTH, method_colour
 from analysis.report.units import counted
 from analysis.section import Plane
-from render.base.arrays import Float, Int
+from render.base.arrays import Float
 from render.base.errors import InputError
-from render.world.world import build_world
 from studio.editing.units import Unit
 from studio.qt.core import theme
 from studio.qt.core.boxes import ChoiceBox
@@ -42,7 +40,7 @@ from studio.qt.forms.unit_box import UnitBox
 from studio.qt.results import plots
 from studio.qt.results.shown_points import NOTHING, are_there, shown_points
 from studio.runtime.error_messages import trouble
-from studio.scan.section import Section, from_pieces, write_section
+from studio.scan.section import THINNEST, Scanned, Section, from_scanned, write_section
 
 LANE = "section"
 NORMALS = {"across x": (1.0, 0.0, 0.0), "across y": (0.0, 1.0, 0.0), "level (across z)": (0.0, 0.0, 1.0)}
@@ -56,8 +54,6 @@ WIDEST = 999.0
 BESIDE_TEXT = 16
 """px, of a box's frame and padding."""
 FILES = "DXF drawing (*.dxf);;CSV table (*.csv)"
-World = tuple[Cloud, Float, Float, Int]
-"""Points, (2, 3) least and largest coordinates of all but a few of them, vertices and triangles of the part."""
 
 
 class SectionTab(QWidget):
@@ -67,14 +63,19 @@ class SectionTab(QWidget):
         super().__init__()
         self.session, self.runner = session, runner
         self.section: Section | None = None
-        self._read: World | None = None
+        self._read: Scanned | None = None
         self.normal = ChoiceBox()
         for name, normal in NORMALS.items():
             self.normal.addItem(name, normal)
         self.normal.addItem("by its normal", None)
         self.own = [_box("Normal", Unit(), -1.0, 1.0, value, 5) for value in (1.0, 0.0, 0.0)]
         self.through = [_box("Through", MM, -1e5, 1e5, 0.0) for _ in range(3)]
-        self.thickness = _box("Slab", MM, 0.001, 1000.0, 1.0)
+        self.thickness = _box("Slab", MM, 0.001, 1000.0, 1e3 * THINNEST)
+        self.thickness.setToolTip(
+            "Points so near to the plane are shown; until you type it, no thinner than the scan's step"
+        )
+        self._typed = False
+        """The slab is as it was asked for, whatever the scan's step."""
         self.middle = text_button("To the middle", "The plane through the middle of the points")
         self.export = text_button("Export…", "DXF (mm, layers TRUE and MEASURED) or CSV")
         self.in_view = QCheckBox("In 3D")
@@ -96,6 +97,7 @@ class SectionTab(QWidget):
         for box in (*self.own, *self.through, self.thickness):
             box.valueChanged.connect(self._moved)
             box.refused.connect(partial(session.message.emit, "warning"))
+        self.thickness.valueChanged.connect(self._slab_typed)
         self.normal.currentIndexChanged.connect(self._another_normal)
         self.middle.clicked.connect(self.to_middle)
         self.export.clicked.connect(self._ask)
@@ -159,8 +161,8 @@ class SectionTab(QWidget):
         """Upright through the middle of the points, near to most of them: of a single frame along its line."""
         if self._read is None:
             return
-        near = 0.5e-3 * self.thickness.value()
-        points = np.column_stack([self._read[0][name] for name in "xyz"])
+        near = 0.5 * THINNEST
+        points = np.column_stack([self._read.pieces[0][name] for name in "xyz"])
         middle = np.median(points, axis=0)
         beside = np.sum(np.abs(points[:, :2] - middle[:2]) <= near, axis=0)
         x, y, z = middle.tolist()
@@ -170,30 +172,25 @@ class SectionTab(QWidget):
         """Of the points, by their medians."""
         if self._read is None:
             return
-        x, y, z = (float(np.median(self._read[0][name])) for name in "xyz")
+        x, y, z = (float(np.median(self._read.pieces[0][name])) for name in "xyz")
         self.take(Plane((x, y, z), self.plane.normal))
 
     def cut(self) -> None:
         """In the background; the last plane counts."""
         try:
             scene, root, read = shown_points(self.session)
-            plane, thickness, before = self.plane, 1e-3 * self.thickness.value(), self._read
+            plane, before = self.plane, self._read
+            thickness = 1e-3 * self.thickness.value() if self._typed else None
             _ = plane.axes
         except InputError as error:
             self.told.setText(str(error))
             return
 
-        def work(progress: object, cancelled: object) -> tuple[Section, World]:
-            if before is None:
-                world = build_world(scene, root)
-                cloud = read()
-                box = np.percentile(np.column_stack([cloud[name] for name in "xyz"]), (1.0, 99.0), axis=0)
-                have = cloud, box, world.vertices, world.triangles
-            else:
-                have = before
-            return from_pieces([have[0]], plane, thickness, *have[2:]), have
+        def work(progress: object, cancelled: object) -> tuple[Section, Scanned]:
+            have = Scanned.of(scene, root, [read()]) if before is None else before
+            return from_scanned(have, plane, thickness), have
 
-        def then(found: tuple[Section, World]) -> None:
+        def then(found: tuple[Section, Scanned]) -> None:
             first = self._read is None
             self.section, self._read = found
             self._show()
@@ -218,6 +215,10 @@ class SectionTab(QWidget):
         if self.isVisible() and not self._rest.isActive():
             self._rest.start()
 
+    def _slab_typed(self) -> None:
+        """It no longer follows the plane."""
+        self._typed = True
+
     def _follow(self) -> None:
         """The 3D view has moved the plane."""
         shown = self.session.section
@@ -231,7 +232,7 @@ class SectionTab(QWidget):
             return
         plane, made = self.plane, self.section
         try:
-            sheet = plane.sheet(*self._read[1])
+            sheet = plane.sheet(*self._read.box)
         except InputError:
             return
         true = [] if made is None else [made.plane.world(line) for line in made.true]
@@ -248,7 +249,12 @@ class SectionTab(QWidget):
         self.plot.setLabel("left", f"{along('Up', made.plane.axes[1])} / mm")
         self.plot.enableAutoRange()
         part, points = counted(len(made.true), "line"), counted(len(made.measured), "point")
-        self.told.setText(f"{part} of the true part, {points} within the slab")
+        told = f"{part} of the true part, {points} within the slab"
+        self.told.setText(f"{told}, {made.remark}" if made.remark else told)
+        if not self._typed:
+            self.thickness.blockSignals(True)
+            self.thickness.setValue(1e3 * made.thickness)
+            self.thickness.blockSignals(False)
         self.export.setEnabled(bool(made.true) or len(made.measured) > 0)
         self._place()
 

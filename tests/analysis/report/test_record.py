@@ -78,9 +78,9 @@ def test_the_report_says_which_figures_are_of_a_sample(quick_reports: None) -> N
     record = long_scan(SMALL)
     page = render_page(dataclasses.replace(report, record=record))
     note = sample_note(total(record.chosen()))
-    assert note in page and "of the 7\u2009200 scan lines" in note
+    assert note in page and "of the 7\u202f200 scan lines" in note
     assert "points in a sample" in headline(dataclasses.replace(report, record=record))
-    assert "are nearer (sample)" in page and "of the 6\u2009000 points" in page
+    assert "are nearer (sample)" in page and "of the 6\u202f000 points" in page
     assert sample_note(total(report.record.chosen())) == "" and "sample" not in headline(report)
     assert ") were rightly measured by" in headline(report), "points that are wrong are among those of its figures"
 
@@ -138,11 +138,11 @@ def test_a_laser_may_be_called_like_a_kind_of_number(name):
     assert counts(report_of(scene, frames)) == [
         ("seconds in embree, all threads", "1.00\u00a0s"),
         (f"relative error, {name}a", "0.40\u00a0%"),
-        (f"lit pixels, {name}a", "200\u2009000"),
-        (f"samples, {name}a", "8\u2009000\u2009000"),
+        (f"lit pixels, {name}a", "200\u202f000"),
+        (f"samples, {name}a", "8\u202f000\u202f000"),
         (f"dropped contributions of direct light, {name}a", "0"),
         (f"relative error of reflections, {name}a", "5.00\u00a0%"),
-        (f"light paths, {name}a", "2\u2009000\u2009000"),
+        (f"light paths, {name}a", "2\u202f000\u202f000"),
         (f"dropped contributions, {name}a", "0"),
         (f"clamped contributions, {name}a", "6"),
         (f"mean radiance taken by the clamp, {name}a", "0.25"),

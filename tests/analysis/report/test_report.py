@@ -193,7 +193,7 @@ def test_the_page_tells_the_numbers(written):
         "exact across the sheet",
         "its share was not measured",
         "older program &lt;b&gt;",
-        "37\u2009035",
+        "37\u202f035",
     ):
         assert text in page
 
@@ -288,7 +288,7 @@ def test_remarks_name_what_is_wrong():
     assert "predicted sigma" in said(extraction(scene, curve, 0, "likelihood", 2.5 * noise))
     assert "10 scan lines" in said(
         extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 10, np.nan, noise))
-    ).replace("\u2009", "")
+    ).replace("\u202f", "")
     assert "outliers" in said(extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 3, 9.0, noise)))
     narrow = dataclasses.replace(first.line, width=0.3 * np.ones_like(first.line.width))
     assert "narrower" in said(dataclasses.replace(first, line=narrow))
@@ -347,7 +347,7 @@ def test_numbers_are_written_for_people():
     assert [digits(x) for x in (0.0, 1.0, -12.345, 1234.5, 0.00123, 3e-9, math.nan)] == [
         "0", "1.00", "-12.3", "1234", "0.00123", "3.00e-09", "–",  # noqa: RUF001
     ]  # fmt: skip
-    assert [counted(n, "line") for n in (0, 1, 1820)] == ["0 lines", "1 line", "1\u2009820 lines"]
+    assert [counted(n, "line") for n in (0, 1, 1820)] == ["0 lines", "1 line", "1\u202f820 lines"]
     assert micrometres(2.17e-5) == "21.7\u00a0µm"
     assert micrometres(0.0123) == "12.3\u00a0mm"
 

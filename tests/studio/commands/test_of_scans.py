@@ -161,6 +161,8 @@ def test_the_table_of_a_section_holds_the_same(scan: Path) -> None:
     assert len(measured) == record["points"] and {row["of"] for row in rows} == {"true", "measured"}
     assert all(abs(float(row["x_m"])) <= 3e-3 + 1e-12 for row in measured)
     assert all(abs(float(row["x_m"])) < 1e-9 for row in rows if row["of"] == "true")
+    cells = [cell for row in rows for name, cell in row.items() if name.endswith("_m") and cell]
+    assert all(cell == f"{float(cell):.9g}" for cell in cells), "0.002493000000000023 was written for 0.002493"
 
 
 def samples(path: Path) -> tuple[int, float]:

@@ -230,7 +230,7 @@ def test_what_is_told_as_a_gain_is_better_and_what_is_worse_is_the_price(
         gains = [part for part in remedy.gain.split(", ")[1:] if not part.startswith("sigma from")]
         for better, parts in ((True, gains), (False, remedy.price.split(", ") if remedy.price else [])):
             for part in parts:
-                told = re.search(r" from ([\d.]+)\S*(?: \S+)? to ([\d.]+)", part.replace("\u2009", ""))
+                told = re.search(r" from ([\d.]+)\S*(?: \S+)? to ([\d.]+)", part.replace("\u202f", ""))
                 assert told is not None, part
                 was, will = map(float, told.groups())
                 assert will != was and (will < was) == better, f"{remedy.label}: {part}"

@@ -173,7 +173,7 @@ def test_large_errors_are_told_in_mm(qtbot: QtBot) -> None:
         ["likelihood"], [("RMSE", "µm", [789531.0]), ("Bias", "µm", [-9999.0]), ("Points", "", [20000.0])]
     )
     told = {made.verticalHeaderItem(i).text(): made.item(i, 0).text() for i in range(3)}
-    assert told == {"RMSE / mm": "790", "Bias / µm": "-9\u2009999", "Points": "20\u2009000"}
+    assert told == {"RMSE / mm": "790", "Bias / µm": "-9\u202f999", "Points": "20\u202f000"}
 
 
 def test_the_words_of_outliers_say_which_completeness_counts(qtbot: QtBot) -> None:
