@@ -36,7 +36,7 @@ def panel(qtbot: QtBot, tmp_path: Path) -> Iterator[StudyPanel]:
     made.show()
     qtbot.waitExposed(made)
     work.change_sweep(vary=[{"field": "sensor.read_noise", "values": [1.0, 2.0, 3.0]}])
-    qtbot.waitUntil(lambda: work.estimate is not None)
+    qtbot.waitUntil(lambda: work.estimate is not None and not work.unseen.busy)
     yield made
     made.close()
     runner.close()
