@@ -52,6 +52,15 @@ CLIPPED = 3.0
 EMPTY = Measures(0, *[float("nan")] * 9)
 
 
+DOMINATED = 3.0
+"""RMSE over what most points err by from which a few rule it: without any it is near 1, on textured parts near 2."""
+
+
+def ruled(rmse: float, median: float, robust_sigma: float) -> bool:
+    """The RMSE is far beyond what most points err by, all alike and each on its own: a few make it."""
+    return bool(rmse > DOMINATED * np.hypot(median, robust_sigma))
+
+
 def outliers(error: Float, floor: Float | float, ceiling: Float | float = np.inf) -> Mask:
     """(m,) errors -> (m,) larger than both `floor` (the error of one pixel) and 5 robust sigma. NaN is no outlier.
 

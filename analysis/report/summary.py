@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from analysis import measures
 from analysis.report.colour import method_name
 from analysis.report.model import ReportInput
 from analysis.report.total import NARROW_PX, Total, total
@@ -17,8 +18,6 @@ SURELY = 6.0
 """Sigmas that most points are off together from which on their calibration is told to be of another set-up."""
 TOLD_OF_NOISE = 0.3
 """Of the robust sigma, from which on the calibration's error is told."""
-DOMINATED = 3.0
-"""RMSE over robust sigma from which a few outliers are told: without any it is near 1, on textured parts near 2."""
 WRONG = "wrong by more than a pixel, and five times the usual error or half the line's width"
 """Of outliers."""
 LITTLE = 0.5
@@ -67,9 +66,8 @@ def _without_outliers(found: Total) -> str:
 
 
 def ruled(found: Total) -> bool:
-    """The RMSE of the depth is far beyond what most points err by, all alike and each on its own: a few make it."""
-    usual = np.hypot(found.depth_z.median, found.depth_z.robust_sigma)
-    return bool(found.depth_z.rmse > DOMINATED * usual)
+    """A few points make the RMSE of the depth."""
+    return measures.ruled(found.depth_z.rmse, found.depth_z.median, found.depth_z.robust_sigma)
 
 
 def tiles(found: Total) -> list[tuple[str, str, str]]:

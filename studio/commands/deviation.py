@@ -6,9 +6,10 @@ import math
 from pathlib import Path
 from typing import Any
 
-from analysis.deviation import FAR_OFF
+from analysis.deviation import FAR, FAR_OFF
+from analysis.measures import ruled
 from analysis.report.gauge_table import PLAIN
-from analysis.report.units import micrometres, percent
+from analysis.report.units import counted, micrometres, percent
 from studio.runtime.streams import print_json
 from studio.scan.deviation import MEANING, Question, compared, write_deviation
 
@@ -58,7 +59,16 @@ def asked(record: dict[str, Any]) -> str:
 def sentence(record: dict[str, Any]) -> str:
     """The deviations in one line."""
     spread = f"robust sigma {micrometres(record['robust_sigma'])}, 95 % within {micrometres(record['p95'])}"
-    return f"median {micrometres(record['median'])}, {spread}"
+    return f"median {micrometres(record['median'])}, {spread}{_ruling(record)}"
+
+
+def _ruling(record: dict[str, Any]) -> str:
+    """How many points make the rms, where it is far beyond what most deviate by; empty: it is of all of them."""
+    far = round(record["share_false"] * record["points"])
+    if not far or not ruled(record["rms"], record["median"], record["robust_sigma"]):
+        return ""
+    farther = f"farther than {micrometres(FAR * record['robust_sigma'])} from the median"
+    return f"; rms {micrometres(record['rms'])}, ruled by {counted(far, 'point')} {farther}"
 
 
 def details(record: dict[str, Any]) -> list[str]:

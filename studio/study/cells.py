@@ -250,6 +250,11 @@ def _repeats(
     return np.array([row[limit.measure] for row in measured], dtype=np.float64)
 
 
+def light_key(cell: Cell, image_scale: float) -> str:
+    """Points with the same one would share their renders, had they no goal that has each rendered for its own noise."""
+    return _Names(cell.varied, image_scale, cell.boards, cell.assumed).render_key(cell.varied.seed)
+
+
 class _Names:
     """Keys of a point's cells. What the point decides is put into words once: a study may have a million cells."""
 

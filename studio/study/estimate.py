@@ -12,7 +12,7 @@ import numpy as np
 from analysis.study.breakdown import EXTRA
 from studio.project.project import Project
 from studio.study.begin import study_bytes
-from studio.study.cells import Cell, cells_at, check_size, lattice_of, methods_of, next_cells, points
+from studio.study.cells import Cell, Point, cells_at, check_size, lattice_of, light_key, methods_of, next_cells, points
 from studio.study.small_images import small_image_doubts
 from studio.study.store import Row
 from studio.study.study import SEARCHES, Study
@@ -21,6 +21,12 @@ from studio.study.tasks import tasks
 
 A_COLUMN = 5
 """Cells of a boundary's column, about."""
+
+NOISE_APART = (
+    "Values that leave the light as it is (sensor, laser power, extraction) share no render: how well a frame is "
+    "rendered depends on the noise (goal in depth); with the goal of the image they share."
+)
+"""Said of values that would share one, had they no goal."""
 
 Costs = tuple[float, float]
 """Seconds that a worker takes for a render, and for developing and measuring one cell of it."""
@@ -77,7 +83,7 @@ def estimate(
     size = study_bytes(study, len(rows) + cells + searched)
     steps = max(base.scene.frame_count for base in bases.values())
     known = None if math.isnan(seconds) else seconds
-    doubts = (*small_image_doubts(study, bases), *_not_shared(missing))
+    doubts = (*small_image_doubts(study, bases), *_not_shared(missing), *_noise_apart(study, missing))
     return Estimate(cells, renders, searched, known, size, steps, doubts, _left_over(study, bases, rows))
 
 
@@ -87,6 +93,21 @@ def _not_shared(cells: Sequence[Cell]) -> tuple[str, ...]:
     if len(methods) < 2:
         return ()
     return ("Each method has renders of its own, as the goal is its own depth; with the goal of the image they share.",)
+
+
+def _noise_apart(study: Study, cells: Sequence[Cell]) -> tuple[str, ...]:
+    """Why points of a sweep that would share a render without a goal in depth have renders of their own."""
+    # one of each point, as its methods and repeats are not told apart by its values
+    of_points: dict[tuple[int, Point], Cell] = {(cell.sweep, cell.point): cell for cell in cells}
+    light: set[tuple[int, str]] = set()
+    for cell in of_points.values():
+        if cell.varied.render.goal is None:
+            continue
+        key = cell.sweep, light_key(cell, study.image_scale)
+        if key in light:
+            return (NOISE_APART,)
+        light.add(key)
+    return ()
 
 
 def _left_over(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> int:

@@ -14,7 +14,11 @@ from studio.preview.preview import Preview
 from studio.preview.readouts import readouts
 from studio.project.project import Project
 from studio.scan.stages import scaled
+from studio.study.draft import IMAGE_SCALE
 from studio.study.study import Study, with_fields
+
+SCALES = (IMAGE_SCALE, 0.5, 1.0)
+"""Of a new study, the fastest first."""
 
 
 def small_image_doubts(study: Study, bases: Mapping[str, Project]) -> tuple[str, ...]:
@@ -39,6 +43,20 @@ def small_image_doubts(study: Study, bases: Mapping[str, Project]) -> tuple[str,
             f"{NARROW_PX:g} px: errors are larger than by the scale alone."
         )
     return tuple(said)
+
+
+def first_scale(base: Project, laser: int = 0) -> float:
+    """The smallest image scale at which a new study of a project is not told that its line is too thin; else 1."""
+    for scale in SCALES:
+        try:
+            width = _width(scaled(base, scale).to_text(), base.folder, laser)
+        except InputError:  # told where the cells are counted
+            return IMAGE_SCALE
+        if width is None:
+            return IMAGE_SCALE
+        if width >= NARROW_PX:
+            return scale
+    return 1.0
 
 
 @lru_cache(maxsize=32)

@@ -21,6 +21,7 @@ from studio.project.project import Project
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.long_work import LongWork
 from studio.qt.core.session import Session
+from studio.qt.study.first_scale import FirstScale
 from studio.qt.study.study_jobs import Ended, estimating, reading, running
 from studio.study.as_begun import as_begun, told_apart
 from studio.study.draft import Data, by_names, finished, new_draft, path_text, suggested, varies_nothing
@@ -60,6 +61,7 @@ class StudyWork(LongWork):
         """Someone looks at the estimate."""
         self.draft, self.loaded = self._begun()
         """loaded: base projects of a study that came from a file; empty: it is of the open project."""
+        self._first_scale = FirstScale(self)
         self.folder = self._kept_folder()
         self._document, self._changed = session.document, False
         """Of which the draft is, and whether it was changed in this window."""
@@ -126,12 +128,16 @@ class StudyWork(LongWork):
         draft = copy.deepcopy(self.draft)
         edit(draft)
         if draft != self.draft:
-            self.draft = draft
             self.chosen = min(self.chosen, len(draft["sweeps"]) - 1)
             self._changed = True
-            self._keep()
-            self.draft_changed.emit()
-            self._rest.start()
+            self.put(draft)
+
+    def put(self, draft: Data) -> None:
+        """Another draft of the same study, kept only where a person has changed it."""
+        self.draft = draft
+        self._keep()
+        self.draft_changed.emit()
+        self._rest.start()
 
     def change_sweep(self, **values: Any) -> None:
         """Set fields of the sweep that is edited; None takes one out."""
@@ -213,6 +219,7 @@ class StudyWork(LongWork):
 
     def look_ahead(self, *, timed: bool = False) -> None:
         """Work out what the draft takes; timed: measure a cell of each sweep for it."""
+        self._first_scale.look()
         try:
             study = self.study()
             bases = self.bases(study)
@@ -314,6 +321,7 @@ class StudyWork(LongWork):
         self.loaded, self.chosen = bases, 0
         self.folder, self.found, self.estimate, self._timed, self.failure = None, None, None, {}, ""
         self.draft = {"schema_version": 1, "name": "study", **draft}
+        self._first_scale.begin()
         self.draft_changed.emit()
         self.found_changed.emit()
         self.state_changed.emit()

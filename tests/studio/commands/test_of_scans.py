@@ -17,8 +17,9 @@ from click.testing import CliRunner, Result
 
 import main
 from analysis.cloud import read_ply
+from analysis.report.units import counted, micrometres
 from render.world.world import build_world
-from studio.commands.deviation import details
+from studio.commands.deviation import details, sentence
 from studio.scan.deviation import Question, compare_cloud, read_cloud
 from studio.scan.scan_folder import open_folder
 from tests.studio.scan_of_steps import small_scan
@@ -76,6 +77,15 @@ def test_a_point_that_is_out_alone_is_said_to_be_undecided_and_by_what_rule(scan
     assert "beyond by 4.6 sigma, which chance does as rarely to any of 8185 points as two sigma to one" in said
     assert "; 1 of the undecided is beyond by two sigma, but not by this" in said
     assert "but not by this" not in " ".join(details(record | {"undecided_but_beyond": 0}))
+
+
+@pytest.mark.parametrize(("rms", "said"), [(2.9e-5, False), (3.1e-5, True)])
+def test_points_rule_the_rms_by_the_rule_of_the_report(scan: Path, rms: float, said: bool) -> None:
+    """Mean -1733 um and rms 36.5 mm stood there of 20195 points of which 105 made them."""
+    record = {**told("deviation", scan), "points": 1000, "share_false": 0.001, "rms": rms}
+    first = sentence({**record, "median": 0.0, "robust_sigma": 1e-5})
+    assert first.startswith("median 0")
+    assert first.endswith(f"ruled by 1 point farther than {micrometres(6e-5)} from the median") == said
 
 
 def test_points_far_off_are_not_called_false(scan: Path) -> None:
@@ -255,6 +265,10 @@ def test_far_off_draw_the_rms_but_not_the_robust_figures(made: Path) -> None:
     assert record["share_false"] == pytest.approx(whole["share_false"] + share, abs=0.003)
     for name in ("robust_sigma", "rms_without_false"):
         assert record[name] == pytest.approx(whole[name], rel=0.05)
+    far = round(record["share_false"] * record["points"])
+    beyond = micrometres(6.0 * record["robust_sigma"])
+    ruling = f"; rms {micrometres(record['rms'])}, ruled by {counted(far, 'point')} farther than {beyond} from"
+    assert ruling in sentence(record)
     assert record["share_beyond"] == pytest.approx(whole["share_beyond"] + share, abs=0.003)
     nobody = compare_cloud(found.project.scene, found.root, spoilt, Question()).record
     assert nobody["share_beyond"] is None

@@ -19,7 +19,8 @@ from studio.qt.core.session import Session, one_of
 from studio.qt.study.study_panel import StudyPanel, estimate_text
 from studio.qt.study.study_work import StudyWork
 from studio.runtime.jobs import Job
-from studio.study.estimate import Estimate
+from studio.study.estimate import NOISE_APART, Estimate, estimate
+from studio.study.study import Study
 from tests.studio.qt.shell.window_hands import until_cancelled
 
 
@@ -35,7 +36,7 @@ def panel(qtbot: QtBot, tmp_path: Path) -> Iterator[StudyPanel]:
     made.show()
     qtbot.waitExposed(made)
     work.change_sweep(vary=[{"field": "sensor.read_noise", "values": [1.0, 2.0, 3.0]}])
-    qtbot.waitUntil(lambda: work.estimate is not None)
+    qtbot.waitUntil(lambda: work.estimate is not None and not work.unseen.busy)
     yield made
     made.close()
     runner.close()
@@ -100,6 +101,27 @@ def test_why_methods_do_not_share_a_render_is_told(panel: StudyPanel, qtbot: QtB
 
     assert "Each method has renders of its own" in with_fixed("render.goal.depth", 0.2)
     assert "renders of its own" not in with_fixed("render.goal", None)
+
+
+def test_why_exposures_and_powers_do_not_share_a_render_is_told_where_it_is_so() -> None:
+    """15 cells of 15 renders were told of laser power by exposure, which both change without rendering anew."""
+    power, exposure = "scene.rig.lasers[0].power", "sensor.exposure_time"
+    moved = "scene.rig.lasers[0].T_rig_laser.translation[0]"
+
+    def told_of(fields: tuple[str, ...], fixed: dict[str, Any]) -> Estimate:
+        vary = [{"field": field, "values": [0.001, 0.002, 0.003]} for field in fields]
+        made = {"base": "plane", "repeats": 2, "set": fixed, "sweeps": [{"name": "s", "vary": vary}]}
+        study = Study.model_validate(made)
+        return estimate(study, study.bases(Path()), {}, {})
+
+    apart, shared = (
+        told_of((power, exposure), {"render.goal.depth": 0.1}),
+        told_of((power, exposure), {"render.goal": None}),
+    )
+    assert (apart.cells, apart.renders) == (18, 18) and NOISE_APART in apart.doubts
+    assert (shared.cells, shared.renders) == (18, 2) and NOISE_APART not in shared.doubts
+    other_light = told_of((moved,), {"render.goal.depth": 0.1})
+    assert other_light.renders == 6 and NOISE_APART not in other_light.doubts
 
 
 def test_measured_cells_that_drop_out_are_told_beside_those_to_come() -> None:
