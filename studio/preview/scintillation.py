@@ -68,7 +68,9 @@ def speckle_px(
     noise = light + background[:, None] + variance
     # far from a line without background or read noise there is neither light nor noise, and nothing is to be weighed
     weight = np.divide(slope, noise, out=np.zeros_like(slope), where=noise > 0.0)
-    moved = weight * light / np.sum(weight * slope, axis=1)[:, None]
+    # of a line without any light nothing is known, which is NaN
+    with np.errstate(divide="ignore", invalid="ignore"):
+        moved = weight * light / np.sum(weight * slope, axis=1)[:, None]
     steep = np.maximum(np.abs(across) / (2.0 * sigma[:, None] ** 2), 1e-6)
     uneven = 1.0 + fineness * (steep / np.tanh(steep) - 1.0)
     shared = covariance[0, 0] * np.sum(moved**2 * uneven, axis=1)
