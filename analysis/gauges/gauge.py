@@ -27,6 +27,8 @@ Kind = Literal[
     "area",
 ]
 Verdict = Literal["pass", "fail", "undecided"]
+LEFT_OUT = "are left out"
+"""What remarks hold that tell how many points of a region a curve leaves out, as over an edge."""
 MISSES = "points miss "
 """How remarks begin that the points are not of the fitted curve, with what else is told before them."""
 REGIONS: dict[Kind, tuple[str, ...]] = {

@@ -12,7 +12,7 @@ from analysis.gauges.area import area_above, section, unseen, without_unsure
 from analysis.gauges.between_edges import along_what, between_edges, sampling_sigma
 from analysis.gauges.edge import NOT_IN_TRUTH, Edge, edge_of
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
-from analysis.gauges.gauge import MOST_GAUGES, REGIONS, Gauge, Verdict
+from analysis.gauges.gauge import LEFT_OUT, MOST_GAUGES, REGIONS, Gauge, Verdict
 from analysis.gauges.oblique import (
     LEAST_OBLIQUE,
     lean_off_a_ball,
@@ -42,9 +42,10 @@ MISFITS = {
     "edge_to_edge": "points miss the straight line of a surface that ends there by {:.0f} times their sigma: where it "
     "is no plane, take regions that reach less far from its edge",
 }
-MANY = 0.1
-"""Of a region's points, from which on it is told that its curve leaves so many out."""
-LEFT_OUT = "{} of the {} points miss the curve in the region {!r} by far and are left out: it may reach over an edge"
+MANY, MOST = 0.1, 1.0 / 3.0
+"""Of a region's points, from which on it is told that its curve leaves so many out, and that it does not fit."""
+FAR_OFF = f"{{}} of the {{}} points in the region {{!r}} are far off its curve and {LEFT_OUT}: is it over an edge?"
+MOST_MISS = "{} of the {} points miss the curve in the region {!r} by far: it is of another shape, or over an edge"
 SWAPPED = "the region {!r} lies on the right of {!r}: drag the two anew, or give their ends anew"
 STRAY = "the exact line does not reach its regions: the value is of stray light or noise"
 NO_TRUTH = "; the exact line does not reach there either, so that the area has no truth"
@@ -166,7 +167,8 @@ def _left_out(gauge: Gauge, profile: Profile, fits: Sequence[Fit]) -> str:
         there = profile.weight(*region) > 0.0
         of_all, missing = np.count_nonzero(there), np.count_nonzero(there & ~fits[min(k, len(fits) - 1)].here)
         if missing > most * of_all:
-            told, most = LEFT_OUT.format(missing, of_all, name), missing / of_all
+            most = missing / of_all
+            told = (FAR_OFF if most < MOST else MOST_MISS).format(missing, of_all, name)
     return told
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from analysis.gauges.gauge import MISSES, REGIONS, TITLES, Gauge, Kind
+from analysis.gauges.gauge import LEFT_OUT, MISSES, REGIONS, TITLES, Gauge, Kind
 from analysis.report.units import NONE, digits
 
 if TYPE_CHECKING:
@@ -169,12 +169,14 @@ def label_of(one: Reading, step: str = "") -> str:
 
 def verdict_text(verdict: str | None, oblique: float | None = None, remark: str = "") -> str:
     """With its mark, by how much its section is not square to its faces (rad, None or NaN for nothing), and what its
-    remark says: that its points miss the fitted curve, or that its regions were put where it ends."""
+    remark says: that its points miss the fitted curve, or some are left out, or its regions were put where it ends."""
     told = [MARKS[verdict]] if verdict else []
     if oblique is not None and math.isfinite(oblique):
         told.append(f"{math.degrees(oblique):.1f}° oblique")
     if MISSES in remark:
         told.append("misfit")
+    elif LEFT_OUT in remark:
+        told.append("points left out")
     if PUT in remark:
         told.append("as dragged")
     return ", ".join(told) or NONE

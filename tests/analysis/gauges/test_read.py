@@ -97,10 +97,21 @@ def test_a_region_that_reaches_over_an_edge_says_how_many_points_are_left_out(ki
     points.position[over, 1] -= np.linspace(0.1, 0.5, len(over))
     reading = read(gauge(kind), 0, points, None)
     assert abs(reading.value - exact) < 4.0 * reading.sigma
-    told = f" of the {len(there)} points miss the curve in the region '{REGIONS[kind][1]}'"
+    told = f" of the {len(there)} points in the region '{REGIONS[kind][1]}' are far off its curve and are left out"
     assert told in reading.remark
     # noise may leave out one more
     assert len(over) <= int(reading.remark.split(told)[0]) <= len(over) + 1
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.2, "pass"), (0.4, "undecided")])
+def test_a_curve_that_leaves_out_more_than_a_third_proves_nothing(share: float, verdict: str) -> None:
+    height, exact = shape("step")
+    points = profile(height, noise=noises(1, 1.0, seed=5)[0])
+    there = np.flatnonzero(points.weight(*REGION["step"][1]) > 0.0)
+    over = there[: round(share * len(there))]
+    points.position[over, 1] -= np.linspace(0.1, 0.5, len(over))
+    limits = {"nominal": exact, "lower": -1e-3, "upper": 1e-3}
+    assert read(gauge("step").model_copy(update=limits), 0, points, None).verdict == verdict
 
 
 @pytest.mark.parametrize("kind", ["width", "opening", "v_depth", "gap"])

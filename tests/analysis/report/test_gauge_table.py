@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from analysis.gauges.gauge import MISSES, Gauge
+from analysis.gauges.gauge import LEFT_OUT, MISSES, Gauge
 from analysis.gauges.read import AS_DRAGGED, Reading
 from analysis.report.gauge_table import beside_nominal, label_of
 
@@ -31,6 +31,7 @@ def test_of_one_region_nothing_is_counted_from_one_to_the_other() -> None:
         (math.nan, "", "Step: 10.0000 mm, ✓ pass"),
         (math.radians(13.0), "", "Step: 10.0000 mm, ✓ pass, 13.0° oblique"),
         (math.nan, f"its {MISSES}the curve by 5 µm", "Step: 10.0000 mm, ? undecided, misfit"),
+        (math.nan, f"12 of 90 {LEFT_OUT}", "Step: 10.0000 mm, ✓ pass, points left out"),
         (math.nan, f"{MISSES}it; {AS_DRAGGED}", "Step: 10.0000 mm, ? undecided, misfit, as dragged"),
     ],
 )

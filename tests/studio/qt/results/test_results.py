@@ -256,9 +256,9 @@ def test_a_measure_stands_in_3d_where_it_was_read_with_its_verdict(
 ) -> None:
     session, cloud = window.session, window.cloud
     profile = results.part._profiles[0][0].position
-    top = profile[:, 1] > np.median(profile[:, 1]) + 0.002
-    ends = [(float(x.min()), float(x.max())) for x in (profile[~top, 0], profile[top, 0])]
-    regions = ((ends[0][0] + 0.001, ends[1][0] - 0.002), (ends[1][0] + 0.002, ends[1][1] - 0.002))
+    ground = profile[profile[:, 1] < np.median(profile[:, 1]) + 0.002, 0]
+    top = float(profile[np.nanargmax(profile[:, 1]), 0])
+    regions = ((float(ground.min()) + 0.001, float(ground.min()) + 0.05), (top - 0.008, top + 0.008))
     gauge = Gauge(name="Step", kind="step", regions=regions)
     session.set(("measures",), (gauge,))
     (one,) = session.measures_in_3d
@@ -270,7 +270,7 @@ def test_a_measure_stands_in_3d_where_it_was_read_with_its_verdict(
     assert np.linalg.norm(np.diff(one.lines[-1][[0, -1]], axis=0)) == pytest.approx(abs(value), rel=1e-3)
     marks = next(child for child in cloud.view.children() if isinstance(child, MeasureMarks))
     assert [label.GetInput() for label in marks.labels] == [one.text.replace("\u00a0", " ")]
-    session.set(("measures",), (gauge.model_copy(update={"nominal": value, "lower": -0.005, "upper": 0.005}),))
+    session.set(("measures",), (gauge.model_copy(update={"nominal": value, "lower": -0.02, "upper": 0.02}),))
     assert session.measures_in_3d[0].verdict == "pass" and "pass" in marks.labels[0].GetInput()
     # another that is read nearby stands a line above it
     session.set(("measures",), (gauge, gauge.model_copy(update={"name": "Again"})))
