@@ -9,9 +9,10 @@ import numpy as np
 
 from render.base.arrays import Float, Int
 from render.base.vectors import Vector, divided, dot, length, minus, negative, rotated, vector
-from render.material.bsdf import evaluate, sample
+from render.material.bsdf import sample
 from render.material.record import ALPHA_X, ALPHA_Y, KIND, SUBSURFACE
-from render.world.surface_interaction import interaction, light_side
+from render.world.preview_shading import bsdf_bands
+from render.world.surface_interaction import interaction
 from render.world.triangles import Surface, plane_of
 
 
@@ -52,8 +53,6 @@ def of_lamp(
     choices (m,), in [0, 1): of the materials of a blend. below: as of `of_environment`.
     """
     out = np.zeros((triangle.shape[0], 3))
-    rgb, alpha, frame = np.empty(3), np.empty(2), np.empty((3, 3))
-    row = np.empty(surface.rows.shape[1])
     for i in range(triangle.shape[0]):
         point = vector(points[i])
         normal, to_camera = _seen(surface, triangle[i], point, camera)
@@ -65,15 +64,9 @@ def of_lamp(
         for band in range(3):
             out[i, band] = below[band] * facing / math.pi
         for j in range(choices.shape[0]):
-            slot = interaction(surface, triangle[i], point, normal, choices[j], rgb, alpha, frame)
-            row[:] = surface.rows[slot]
-            row[ALPHA_X], row[ALPHA_Y] = alpha[0], alpha[1]
-            wo, wi = rotated(frame, to_camera), rotated(frame, to_lamp)
-            if wo[2] > 0.0 and wi[2] > 0.0:
-                f = evaluate(row, (rgb[0], rgb[1], rgb[2]), wo, wi)
-                share = facing * light_side(wi[2], facing) / choices.shape[0]
-                for band in range(3):
-                    out[i, band] += share * f[band]
+            f = bsdf_bands(surface, triangle[i], point, normal, to_camera, to_lamp, choices[j])
+            for band in range(3):
+                out[i, band] += facing * f[band] / choices.shape[0]
     return out
 
 

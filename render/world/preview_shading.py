@@ -1,4 +1,4 @@
-"""Shading of previews: headlight and laser light of a pixel from one ray, on diffuse surfaces, without shadows.
+"""Shading of previews: headlight and laser light of a pixel from one ray, without shadows; wax and skin as diffuse.
 
 The line across a pixel is integrated in closed form on the facet's plane, as in `render.laser_direct.integrator`, but
 more coarsely.
@@ -12,7 +12,11 @@ import numba
 import numpy as np
 
 from render.base.arrays import Float, Float32, Int
+from render.base.vectors import Vector, divided, dot, length, rotated, scaled
 from render.laser.irradiance import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2, fan_density, sheet_sigma
+from render.material.bsdf import evaluate, is_diffuse
+from render.material.record import ALPHA_X, ALPHA_Y, KIND, SUBSURFACE
+from render.world.surface_interaction import interaction, light_side
 from render.world.triangles import Surface, reflectance
 
 
@@ -27,6 +31,38 @@ def mean_across(q: float, slope_u: float, slope_v: float) -> float:
         return math.exp(-0.5 * (q / sigma) ** 2) * INV_SQRT_2PI / sigma
     low, high = (q - 0.5 * wide) / (sigma * SQRT2), (q + 0.5 * wide) / (sigma * SQRT2)
     return 0.5 * (math.erf(high) - math.erf(low)) / wide
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def unit(a: Vector) -> Vector:
+    return divided(a, length(a))
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def is_plain(surface: Surface, t: int) -> bool:
+    """Triangle t is shown as diffuse, of one material and without a shading normal."""
+    slot = surface.object_id[t]
+    row = surface.rows[slot]
+    diffuse = is_diffuse(row) or row[KIND] == SUBSURFACE
+    return diffuse and surface.second[slot] < 0 and surface.detail[slot] == 0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def bsdf_bands(
+    surface: Surface, t: int, point: Vector, normal: Vector, to_camera: Vector, to_light: Vector, choice: float
+) -> Vector:
+    """BSDF in R, G, B, 1/sr, of triangle t at a point for unit directions; 0 where light or camera is below it.
+
+    normal: the facet's, on the camera's side. choice: in [0, 1), of a blend's materials.
+    """
+    rgb, alpha, frame = np.empty(3), np.empty(2), np.empty((3, 3))
+    slot = interaction(surface, t, point, normal, choice, rgb, alpha, frame)
+    row = surface.rows[slot].copy()
+    row[ALPHA_X], row[ALPHA_Y] = alpha[0], alpha[1]
+    wo, wi = rotated(frame, to_camera), rotated(frame, to_light)
+    if wo[2] <= 0.0 or wi[2] <= 0.0:
+        return 0.0, 0.0, 0.0
+    return scaled(light_side(wi[2], dot(normal, to_light)), evaluate(row, (rgb[0], rgb[1], rgb[2]), wo, wi))
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -57,8 +93,7 @@ def shade_pixels(  # noqa: PLR0913
         ab0, ab1, ab2 = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
         ac0, ac1, ac2 = v[c, 0] - v[a, 0], v[c, 1] - v[a, 1], v[c, 2] - v[a, 2]
         n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
-        length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
-        n0, n1, n2 = n0 / length, n1 / length, n2 / length
+        n0, n1, n2 = divided((n0, n1, n2), math.sqrt(n0 * n0 + n1 * n1 + n2 * n2))
         d0, d1, d2 = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
         facing = n0 * d0 + n1 * d1 + n2 * d2
         s = (n0 * (v[a, 0] - m[0, 3]) + n1 * (v[a, 1] - m[1, 3]) + n2 * (v[a, 2] - m[2, 3])) / facing
@@ -101,5 +136,9 @@ def shade_pixels(  # noqa: PLR0913
             if not facing * (l0 * x + l1 * y + l2 * z) > 0.0:
                 continue
             flux = beam[0] * h / (z * sigma) * abs(l0 * q * slope + l1 * y / z + l2)
-            albedo = weights[k, 0] * rgb[0] + weights[k, 1] * rgb[1] + weights[k, 2] * rgb[2]
-            light[k, i] = flux * mean * albedo / math.pi
+            f = rgb[0] / math.pi, rgb[1] / math.pi, rgb[2] / math.pi
+            if not is_plain(surface, t):
+                up = (-n0, -n1, -n2) if facing > 0.0 else (n0, n1, n2)
+                to_light = rotated(w[:3, :3].T, (-x, -y, -z))
+                f = bsdf_bands(surface, t, (p0, p1, p2), up, unit((-d0, -d1, -d2)), unit(to_light), 0.5)
+            light[k, i] = flux * mean * (weights[k, 0] * f[0] + weights[k, 1] * f[1] + weights[k, 2] * f[2])

@@ -15,6 +15,13 @@ from studio.project.project import Project
 from studio.scan.stages import scaled
 
 SCALE = 0.25
+MATERIALS = (
+    Lambertian(albedo=0.8),
+    Conductor(metal="steel", roughness=0.1, roughness_across=0.35),
+    Conductor(metal="copper", roughness=0.4),
+    Coated(albedo=0.02, roughness=0.1),
+)
+NAMES = ("white", "ground steel", "rolled copper", "black plastic")
 
 
 def made_of(material: Material) -> Project:
@@ -25,16 +32,7 @@ def made_of(material: Material) -> Project:
     return scaled(project.replaced(changed), SCALE).in_folder(project.folder)
 
 
-@pytest.mark.parametrize(
-    "material",
-    [
-        Lambertian(albedo=0.8),
-        Conductor(metal="steel", roughness=0.1, roughness_across=0.35),
-        Conductor(metal="copper", roughness=0.4),
-        Coated(albedo=0.02, roughness=0.1),
-    ],
-    ids=["white", "ground steel", "rolled copper", "black plastic"],
-)
+@pytest.mark.parametrize("material", MATERIALS, ids=NAMES)
 def test_the_peak_of_any_opaque_material_is_as_rendered(material: Material) -> None:
     """Ground steel was told to saturate by 15 times where its render had a hundredth of that."""
     project = made_of(material)
@@ -42,6 +40,18 @@ def test_the_peak_of_any_opaque_material_is_as_rendered(material: Material) -> N
     (seen,) = laser_views(project, render(project))
     assert told.peak_electrons is not None and seen.peak_electrons is not None
     assert told.peak_electrons.middle == pytest.approx(seen.peak_electrons, rel=0.15)
+
+
+@pytest.mark.parametrize("material", MATERIALS, ids=NAMES)
+def test_the_line_of_the_live_picture_is_as_bright_as_rendered(material: Material) -> None:
+    """On ground steel it was that of a white wall, and painted as saturated."""
+    project = made_of(material)
+    (seen,) = render(project).laser_direct
+    (live,) = Preview().look(project, project.folder).image(1.0).laser
+    rows = seen.sum(axis=1)
+    some = rows > 0.1 * np.median(rows)
+    # one ray a pixel: rows differ, their middle hardly
+    assert np.median(live.sum(axis=1)[some] / rows[some]) == pytest.approx(1.0, rel=0.1)
 
 
 def test_a_mirror_sends_nothing_of_the_line_to_the_camera() -> None:
