@@ -86,6 +86,10 @@ class Render:
         """The project, at full scale, by whose sensor, power and extraction it is developed and measured."""
         return self.source if self.cell and self.source is not None else now
 
+    def awaits_depth(self, now: Project) -> bool:
+        """What the sensor's defocus needs of it is still to be rendered."""
+        return not self.final and self.frame.truth is None and now.sensor.needs_depth(now.scene.camera.lens.model)
+
     def is_measured(self, how: Development) -> bool:
         """Images and measurements are of the present frame, developed like this."""
         return self.has("images", how) and self.has("measurements", how)

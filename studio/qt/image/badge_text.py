@@ -15,11 +15,11 @@ def badge_text(session: Session, is_live: bool, ready: bool) -> str:
     if shown is None and not ready:
         return "Preparing the live estimate; the very first time this takes half a minute."
     if shown is None:
-        return "Live estimate: one ray a pixel, no noise. Render for the real image."
+        return "Live estimate: one ray a pixel, lit from the camera, no noise. Render for the real image."
     if session.stale:
         return "Live estimate: the scene has changed since the render." if is_live else "The scene has changed."
     if is_live:
-        return "Live estimate: one ray a pixel, no noise."
+        return "Live estimate: one ray a pixel, lit from the camera, no noise."
     if shown.cell:
         return f"{OF_A_CELL} {shown.name}"
     return "Still refining." if not shown.final and session.dragging else ""

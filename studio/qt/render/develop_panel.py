@@ -293,7 +293,11 @@ class DevelopPanel(QWidget):
             return
         # of light that is still to come the project's own method tells enough, and takes no time from the render
         frame, noise, methods = render.frame, self.noise.isChecked(), self.chosen()[: 1 if render.refining else None]
-        how = development(render.project, render.developed_by(self.session.project), render.image_scale)
+        now = render.developed_by(self.session.project)
+        awaits_depth = render.awaits_depth(now)
+        if awaits_depth:
+            now = now.model_copy(update={"sensor": now.sensor.model_copy(update={"defocus": False})})
+        how = development(render.project, now, render.image_scale)
         names = [laser.name for laser in render.project.scene.lasers]
 
         def work(progress: Progress, cancelled: Cancel) -> list[Image]:
@@ -302,16 +306,17 @@ class DevelopPanel(QWidget):
             seconds = time.perf_counter() - start
             blur = how.project.sensor.defocus_by(how.project.scene.camera.lens.model)
             told = brightness(images, names, frame) + (f"\ndefocus by {blur}" if blur != "nothing" else "")
+            told += "\nin focus until its depth is rendered" if awaits_depth else ""
             told += f"\n{OF_A_CELL}" if render.cell else ""
             render.noise = noise
             self._images_ready.emit(render, (frame, how), images, seconds, told)
             return images
 
         def then(images: list[Image]) -> None:
-            self._without_figures = render.refining and frame.awaits_ambient
+            self._without_figures = awaits_depth or (render.refining and frame.awaits_ambient)
             if self._without_figures:
                 self._rest_from(self._began, WITHOUT_FIGURES)
-                return  # figures without its noise would be too good, and take time from it
+                return  # figures without its noise or blur would be too good, and take time from it
             self._to_measure = (render, frame, how, images, methods)
             self._rest.start(0 if render.refining else REST_MS)  # nobody drags light
 
