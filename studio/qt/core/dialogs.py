@@ -81,8 +81,8 @@ def ask_under_way(parent: QWidget, what: str) -> bool:
 
 
 def ask_loss(parent: QWidget, what: str) -> bool:
-    """Whether to close although what took long goes with it; what: sentences about it."""
-    return _ask_to_go(parent, "not-kept", "Not kept", "Close all the same?", "Close", what)
+    """Whether to close, or open another project, although what took long goes with it; what: sentences about it."""
+    return _ask_to_go(parent, "not-kept", "Not kept", "Go on all the same?", "Go on", what)
 
 
 def ask_removal(parent: QWidget, what: str) -> bool:

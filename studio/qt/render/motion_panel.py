@@ -125,7 +125,9 @@ class MotionPanel(QWidget):
             return  # the folder that a person chooses is made
         place = self.session.place
         name = unused_name(place, f"{self.session.project.name} scan")
-        chosen = ask_results_folder(self, "Folder for the scan's results", place, name)
+        # the size of a single render is another one
+        size = f"{self.session.project.scene.frame_count} frames at {self.scale.currentText()}"
+        chosen = ask_results_folder(self, f"Folder for the scan's results: {size}", place, name)
         if chosen is None:
             return
         goes_on = is_unfinished(chosen, scaled(self.session.project, SCALES[self.scale.currentText()]))

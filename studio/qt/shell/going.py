@@ -10,7 +10,7 @@ from studio.qt.core.jobs import RENDER, JobRunner, duration
 from studio.qt.core.session import Session
 from studio.qt.shell.panels import Panels
 
-COSTLY = 10.0
+COSTLY = 60.0
 """s of work that a person waited for, and does not want to wait for again for a slip of the hand."""
 STAY = "Keep with the project, in the menu of the list of renders, keeps one."
 

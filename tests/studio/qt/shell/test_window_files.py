@@ -147,12 +147,12 @@ class TestFiles:
         kept = [Render(k, window.session.project, world, frame, kept=k == 1, asked=k != 2) for k in (1, 2, 3, 4)]
         monkeypatch.setattr(window.session, "renders", kept)
         assert window.files.may_close(), "renders of moments are not asked about"
-        long = [replace(one, frame=replace(frame, seconds={"laser light": 6.0})) for one in kept]
+        long = [replace(one, frame=replace(frame, seconds={"laser light": 36.0})) for one in kept]
         monkeypatch.setattr(window.session, "renders", long)
         said: list[str] = []
         monkeypatch.setattr("studio.qt.shell.file_actions.ask_loss", lambda parent, text: said.append(text) or False)
         assert not window.files.may_close(), "those that took longer are"
-        assert "2 renders of this session, 12 s of work, are kept nowhere" in said[0]
+        assert "2 renders of this session, 1 min of work, are kept nowhere" in said[0]
         monkeypatch.setattr(window.session, "renders", kept)
         window.runner.run(RENDER, "render", until_cancelled)
         monkeypatch.setattr(panel, "asked", False)
@@ -174,14 +174,14 @@ class TestFiles:
     ) -> None:
         """Of three it asked "Close without it?"."""
         world, frame = small_render()
-        long = replace(frame, seconds={"laser light": 12.0})
+        long = replace(frame, seconds={"laser light": 72.0})
         asked: list[tuple[str, str]] = []
         monkeypatch.setattr(QMessageBox, "exec", lambda box: asked.append((box.text(), box.informativeText())))
         for count in (1, 3):
             made = [Render(k, window.session.project, world, long, asked=True) for k in range(count)]
             monkeypatch.setattr(window.session, "renders", made)
             assert not window.files.may_close()
-        assert [question for question, _ in asked] == 2 * ["Close all the same?"]
+        assert [question for question, _ in asked] == 2 * ["Go on all the same?"]
         assert "3 renders of this session" in asked[1][1]
 
     def test_a_project_dropped_on_the_window_is_opened(
