@@ -241,6 +241,8 @@ def _sigma(r: Readouts) -> Row:
         return Row("sigma", "Depth noise, sigma", NOTHING, "saturated", "warning", help)
     photon, speckle = micrometres(r.photon_sigma), micrometres(r.speckle_sigma)
     supposed, level = _supposed(r)
+    if r.textured:
+        help += " Texture, whose edges move the line, adds to it what only a render tells."
     if supposed:
         help += f" Here it is foretold for a line that is {supposed[len('as if ') :]}, which this one is not."
     if not r.speckled:
@@ -292,7 +294,10 @@ def _supposed(r: Readouts) -> tuple[str, Level]:
         wrong.append("opaque")
     if r.saturated is not None and r.saturated > MUCH_SATURATED:
         wrong.append("unsaturated")
-    return (f"as if {' and '.join(wrong)}", "warning") if wrong else ("", "")
+    level: Level = "warning" if wrong else ""
+    if r.textured:
+        wrong.append("plain")  # which no setting could mend
+    return (f"as if {' and '.join(wrong)}", level) if wrong else ("", "")
 
 
 def _both(supposed: str, note: str) -> str:

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from pydantic import BaseModel
 
 from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float
 from render.camera.camera import Camera
-from render.material.material import Subsurface
+from render.material.material import FromMesh, GreyTexture, Subsurface, Texture
 from studio.preview import estimates
 from studio.preview.calibration_fit import CalibrationFit, calibration_fit
 from studio.preview.inspection import working_range
@@ -92,6 +93,8 @@ class Readouts:
     """Diameter of the blur disc along the lit line."""
     spreads: bool = False
     """Light goes below some of the surfaces that are lit, and leaves beside the line."""
+    textured: bool = False
+    """Some of the surfaces that are lit have images: their brightness changes within the line."""
     blurs_images: bool = True
     """Images have that blur: their lens is rendered, or the sensor's defocus is switched on."""
     photon_sigma: float | None = None
@@ -114,6 +117,13 @@ class Readouts:
     def depth_sigma(self) -> float | None:
         """Of all noise that the sensor, as it is set, puts into an image."""
         return self.speckled_sigma if self.speckled else self.photon_sigma
+
+
+def _has_images(material: BaseModel) -> bool:
+    """It, or a part of it, takes values from an image or from the mesh's file."""
+    values = [getattr(material, name) for name in type(material).model_fields]
+    models = [value for value in values if isinstance(value, BaseModel)]
+    return any(isinstance(one, Texture | GreyTexture | FromMesh) or _has_images(one) for one in models)
 
 
 def readouts(look: Look, laser: int) -> Readouts:
@@ -161,6 +171,7 @@ def readouts(look: Look, laser: int) -> Readouts:
     speckle = speckle_px(camera, source.wavelength_nm, *shown, read, sensor.speckle == "depolarised")
     many = np.unique(np.linspace(0, len(width) - 1, FILLED_PLACES).astype(int))
     lines = width[many], curve.position[many], amplitude[many], ambient[many]
+    lit_materials = [scene.visible_objects[i].material for i in np.unique(curve.object_id)]
     return replace(
         known,
         triangulation_angle=_range(triangulation_angles(curve.point, T_camera_laser[:3, 3])),
@@ -175,7 +186,8 @@ def readouts(look: Look, laser: int) -> Readouts:
         most_laser_electrons=None if (lit_by := _range(light)) is None else lit_by.high,
         ambient_electrons=float(np.median(ambient)),
         detected=_median(response / look.project.extraction.threshold),
-        spreads=any(isinstance(scene.visible_objects[i].material, Subsurface) for i in np.unique(curve.object_id)),
+        spreads=any(isinstance(material, Subsurface) for material in lit_materials),
+        textured=any(_has_images(material) for material in lit_materials),
         blur_px=_range(estimates.blur_px(camera, curve.point)),
         photon_sigma=_median(bound * depth),
         speckle_sigma=_median(speckle * depth[some]),

@@ -258,3 +258,13 @@ def test_distances_are_in_the_unit_that_fields_show(monkeypatch: pytest.MonkeyPa
         assert float(value) == pytest.approx(25.4 * float(other), rel=0.01)
     assert inches["working"].value.endswith(" in")
     assert inches["depth"] == told["depth"]
+
+
+@pytest.mark.parametrize(("name", "told"), [("weld_seam", "as if plain, with speckle"), ("plane", "with speckle")])
+def test_noise_that_texture_adds_is_said_to_be_left_out(name: str, told: str) -> None:
+    """Of the seam's 20.8 um Design tells 11.9."""
+    project = Project.load(name)
+    found = rows(readouts(Preview().look(project, project.folder), 0))
+    (row,) = [one for one in found if one.key == "sigma"]
+    assert row.note.startswith(told) and row.level == ""
+    assert ("Texture" in row.help) == (name == "weld_seam")
