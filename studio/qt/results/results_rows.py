@@ -17,6 +17,8 @@ from studio.scan.result_series import ErrorView, Series, readable_unit, symmetri
 
 PLOTTED = 99.5
 """Percent of the errors within the axis; the others are crosses at its ends."""
+REACH_PX = 6.0
+"""From the mouse, of a dot that it is at."""
 
 
 class RowPlots(plots.PointedPlots):
@@ -99,7 +101,7 @@ class RowPlots(plots.PointedPlots):
             y: list[float] = []
             for series, error in self._shown.values():
                 here = np.flatnonzero(series.index == scan_line) if scan_line is not None else np.zeros(0, dtype=int)
-                values = (series.position, series.depth, np.clip(error, -self.limit, self.limit))[k][here]
+                values = self._drawn_values(k, series, error)[here]
                 x += series.index[here][np.isfinite(values)].tolist()
                 y += values[np.isfinite(values)].tolist()
             ring.setData(x, y)
@@ -123,10 +125,28 @@ class RowPlots(plots.PointedPlots):
         self._drawn.append((plot, item))
         return item
 
+    def _drawn_values(self, k: int, series: Series, error: Float) -> Float:
+        """What the k-th plot shows of a method, (n,)."""
+        return (series.position, series.depth, np.clip(error, -self.limit, self.limit))[k]
+
+    def _near(self, k: int, point: QPointF) -> int | None:
+        """The scan line of the dot that is nearest; None: none is near."""
+        width, height = self.plots[k].vb.viewPixelSize()
+        found, least = None, REACH_PX
+        for series, error in self._shown.values():
+            values = self._drawn_values(k, series, error)
+            away = np.hypot((series.index - point.x()) / width, (values - point.y()) / height)
+            away = np.where(np.isfinite(away), away, np.inf)
+            if len(away) and away.min() < least:
+                found, least = int(series.index[np.argmin(away)]), float(away.min())
+        return found
+
     def scan_line_at(self, position: QPointF) -> int | None:
-        for plot in self.plots:
+        """Of the dot under the mouse, which may not be that of its column: rows lie closer than pixels."""
+        for k, plot in enumerate(self.plots):
             point = plots.at(plot, position)
             if point is not None:
-                scan_line = round(point.x())
+                near = self._near(k, point)
+                scan_line = round(point.x()) if near is None else near
                 return scan_line if self.count is None or 0 <= scan_line < self.count else None
         return None

@@ -103,7 +103,30 @@ def test_beside_the_rows_of_the_image_nothing_is_pointed_at(plots: RowPlots, qtb
     plots.count = len(ROWS)
     pointed: list[int | None] = []
     plots.hovered.connect(pointed.append)
+    ((_, error),) = plots._shown.values()
+    dot = float(error[250])
     for row in (-20.0, 250.0, 510.0):
         plots.error.setXRange(-60.0, 560.0, padding=0.0)
-        plots._move(plots.error.vb.mapViewToScene(QPointF(row, 0.0)))
+        plots._move(plots.error.vb.mapViewToScene(QPointF(row, dot)))
     assert pointed == [None, 250, None]
+
+
+def test_a_click_on_a_dot_is_of_its_row_though_others_lie_in_the_same_pixel(plots: RowPlots, qtbot: QtBot) -> None:
+    """With four rows to a pixel a click on the outlier chose a good point beside it."""
+    plots.resize(200, 400)
+    plots.show()
+    qtbot.waitExposed(plots)
+    plots.count = len(ROWS)
+    qtbot.waitUntil(lambda: plots.error.vb.width() > 50)
+    a_row = 1.0 / plots.error.vb.viewPixelSize()[0]
+    assert a_row < 0.5
+    for row, value in ((400, plots.limit), (100, -plots.limit)):
+        for aside in (-3.0, 0.0, 3.0):
+            place = plots.error.vb.mapViewToScene(QPointF(row, value))
+            assert plots.scan_line_at(place + QPointF(aside, 0.0)) == row
+    # where no dot is near it is the row beneath the mouse
+    flat = np.zeros(len(ROWS))
+    two = {"likelihood": (Series(ROWS, flat, flat, flat, flat), np.where(ROWS % 2.0 == 0.0, 5.0, -5.0))}
+    plots.show_series("rows", None, two, ERROR_VIEWS[0])
+    found = plots.scan_line_at(plots.error.vb.mapViewToScene(QPointF(250.0, 0.0)))
+    assert found is not None and abs(found - 250) * a_row < 1.0
