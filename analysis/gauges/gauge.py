@@ -66,6 +66,8 @@ TITLES: dict[Kind, str] = {
     "flush": "Flush",
     "area": "Area",
 }
+KINDS_OF_SCAN: tuple[Kind, ...] = ("flatness",)
+"""Read off all steps of a scan together."""
 NEVER_NEGATIVE = ("width", "opening", "radius", "flatness", "point_to_point", "edge_to_edge")
 """Kinds whose lower limit of 0, as drawings have it, is kept by every part, however uncertain the value is."""
 MOST_GAUGES = 64
@@ -126,7 +128,7 @@ class Gauge(Model):
     @property
     def of_scan(self) -> bool:
         """It is read off all steps together, not off each."""
-        return self.kind == "flatness"
+        return self.kind in KINDS_OF_SCAN
 
     @property
     def unit(self) -> Literal["m", "rad", "m2"]:

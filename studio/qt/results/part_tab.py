@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
+from analysis.gauges.gauge import KINDS_OF_SCAN, MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
 from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, marked_verdict, missing_of, remark_of
@@ -331,6 +331,8 @@ class PartTab(QWidget):
             names = REGIONS[self.placing]
             count = f" ({len(self._placed) + 1} of {len(names)})" if len(names) > 1 else ""
             text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
+            if self.placing in KINDS_OF_SCAN and (self.session.shown is None or self.session.shown.scan is None):
+                text += f" {first_upper(OF_SCAN)}."
         elif entry is not None and (reason := missing_of(entry)):
             text = first_upper(reason)
         elif gauge is not None and (odd := beside_nominal(gauge, None if entry is None else entry["value"])):

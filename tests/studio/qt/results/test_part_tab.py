@@ -261,6 +261,9 @@ def test_scan_lines_dragged_in_the_picture_are_a_measures_region_while_it_is_add
 
 
 def test_a_flatness_of_a_still_frame_says_that_it_wants_a_scan(panel: ResultsPanel) -> None:
+    panel.part.start("flatness")
+    assert "drag across the surface" in panel.part.told.text() and "whole scan" in panel.part.told.text()
+    panel.part.cancel()
     flat = Gauge(name="flat", kind="flatness", regions=((-0.25, 0.25),))
     assert panel.session.set(("measures",), (flat,), "add a flatness")
     panel.part.table.selectRow(0)
