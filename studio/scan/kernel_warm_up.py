@@ -189,10 +189,7 @@ def draw(cancelled: Cancel) -> None:
 
 
 def scan(cancelled: Cancel) -> None:
-    """The same, measured by every method, smoothed along, with what is foretold, and what calibrations need.
-
-    Raises whatever is broken.
-    """
+    """The same, foretold, measured by every method, smoothed, and what calibrations need. Raises whatever is broken."""
     from analysis.calibration.estimate import Estimate
     from analysis.calibration.observations import Stripe, View, gather
     from analysis.calibration.residuals import corners, laser_points
@@ -206,6 +203,7 @@ def scan(cancelled: Cancel) -> None:
     estimate = Estimate(np.ones(4), np.zeros(0), np.zeros(2), alone[0, :1], alone, alone[0, 2:])
     corners(seen, estimate)
     laser_points(seen, estimate)
+    look(cancelled)  # a scan foretells its noise by such a look
     project, frame, world, images, clock = _drawn(cancelled, DepthGoal())
     foreseen_noise(project, template_folder(TEMPLATE))
     found = measure_frame(project, frame, world, images, clock, None, keep=False)
