@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import KINDS_OF_SCAN, MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
+from analysis.report.colour import method_name
 from analysis.report.gauge_table import DEFINITIONS, beside_nominal, cells, marked_verdict, missing_of, remark_of
 from analysis.report.units import NONE
 from studio.project.same_lasers import same_lasers
@@ -65,6 +66,8 @@ class PartTab(QWidget):
         """Of the project's measures."""
         self.readings: tuple[Reading, ...] = ()
         self._profiles: dict[int, tuple[Profile, Profile]] = {}
+        self._method = ""
+        """By which the points were found."""
         self._steps = PartSteps(session, scan_bar)
         self._entries: tuple[dict[str, Any] | None, ...] = ()
         """Rows of the table, each as a scan's report would have it."""
@@ -117,6 +120,7 @@ class PartTab(QWidget):
         self._profiles = {}
         if render is not None and render.measurements:
             found = best(render.measurements, render.developed_by(self.session.project))
+            self._method = next(name for name, one in render.measurements.items() if one is found)
             used = {laser, *(gauge.laser for gauge in self._as_rendered())}
             self._profiles = {
                 i: profiles(render.project, render.frame, one, self.session.project.measured_in)
@@ -341,6 +345,8 @@ class PartTab(QWidget):
             text = first_upper(f"{remark_of(entry)}.")
         elif self.readings and (render := self.session.shown) is not None:
             text = lean_text(render.project.scene, self.laser, render.frame.step, self.session.project.measured_in)
+        if self.readings and self.placing is None:
+            text = f"{text} Points are by {method_name(self._method)}, as Extraction says.".strip()
         if self._read and self.placing is None:
             kept = entry is not None and entry["reason"] != OF_SCAN
             text = f"{self._steps.told(gauge, kept, self._read)} {text}".strip()

@@ -31,6 +31,7 @@ def test_a_measure_of_any_kind_is_drawn_with_its_regions(kind: Kind, qtbot: QtBo
     session.set(("measures",), (Gauge(name="one", kind=kind, regions=regions),))
     panel.part.table.selectRow(0)
     (reading,) = panel.part.readings
+    assert "by maximum likelihood, as Extraction says" in panel.part.told.text()
     assert not (kind in READ and reading.reason)
     spans = panel.part.drawing.spans
     assert [span.isVisible() for span in spans] == [True] * len(regions)
