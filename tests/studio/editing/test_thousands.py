@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtGui import QFont, QGuiApplication, QTextLayout
 
 from render.laser.laser import LineLaser
 from studio.editing.forms import describe
@@ -36,14 +35,3 @@ def test_a_limit_is_told_so_too() -> None:
 
 def test_a_field_holds_what_can_be_typed_on_any_keyboard() -> None:
     assert Unit.of("m").format(1.5) == "1500"
-
-
-def test_no_line_breaks_inside_a_number() -> None:
-    """In a narrow panel "Of 1" stood over "633 points": Qt breaks lines at a thin space that is not a no-break one."""
-    QGuiApplication.instance() or QGuiApplication([])
-    layout = QTextLayout(f"Of {Unit.of('m').with_unit(1.131)}", QFont())
-    layout.beginLayout()
-    first = layout.createLine()
-    first.setNumColumns(len("Of 1") + 1)
-    layout.endLayout()
-    assert first.textLength() == len("Of ")
