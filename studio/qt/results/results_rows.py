@@ -130,8 +130,10 @@ class RowPlots(plots.PointedPlots):
         return (series.position, series.depth, np.clip(error, -self.limit, self.limit))[k]
 
     def _near(self, k: int, point: QPointF) -> int | None:
-        """The scan line of the dot that is nearest; None: none is near."""
+        """The scan line of the dot that is nearest; None: none is near, or each has pixels of its own."""
         width, height = self.plots[k].vb.viewPixelSize()
+        if width <= 1.0:
+            return None
         found, least = None, REACH_PX
         for series, error in self._shown.values():
             values = self._drawn_values(k, series, error)

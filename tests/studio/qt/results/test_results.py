@@ -68,8 +68,8 @@ def scan_line_in(window: MainWindow) -> int:
 def test_pointing_at_a_row_marks_it_everywhere(window: MainWindow, results: ResultsPanel, qtbot: QtBot) -> None:
     row = scan_line_in(window)
     plot = results.rows.depth
-    low, high = plot.vb.viewRange()[1]
-    at = plot.vb.mapViewToScene(QPointF(row, (low + high) / 2))
+    series, _ = results.rows._shown["likelihood"]
+    at = plot.vb.mapViewToScene(QPointF(row, float(series.depth[series.index == row][0])))
     qtbot.mouseMove(results.rows.viewport(), results.rows.mapFromScene(at))
     qtbot.waitUntil(lambda: window.session.hovered is not None)
     hovered = window.session.hovered
