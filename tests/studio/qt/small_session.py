@@ -20,6 +20,7 @@ from studio.qt.core.render import Render
 from studio.qt.core.session import Session
 from studio.qt.image.camera_view import CameraView
 from studio.qt.render.develop_panel import DevelopPanel
+from studio.qt.results.results_panel import ResultsPanel
 from studio.scan.redevelop import develop_again, development, measure_again
 from studio.scan.stages import Measurement, scaled
 
@@ -55,6 +56,19 @@ def small_session(rendered: bool = False) -> Session:
         world, frame = small_render()
         session.add_render(Render(1, small_project(), world, frame))
     return session
+
+
+def measured_results(qtbot: QtBot) -> ResultsPanel:
+    """The results of a session with a render, on the screen, measured by maximum likelihood."""
+    session = small_session(rendered=True)
+    assert session.shown is not None
+    session.shown.measurements = small_measurements()
+    panel = ResultsPanel(session)
+    qtbot.addWidget(panel)
+    panel.resize(1366, 420)
+    panel.show()
+    qtbot.waitExposed(panel)
+    return panel
 
 
 @contextmanager

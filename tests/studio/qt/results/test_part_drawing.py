@@ -6,8 +6,8 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from analysis.gauges.gauge import REGIONS, Gauge, Kind
-from studio.qt.results.results_panel import PART, ResultsPanel
-from tests.studio.qt.small_session import small_measurements, small_session
+from studio.qt.results.results_panel import PART
+from tests.studio.qt.small_session import measured_results
 
 GROUND, ARC, BESIDE = (-0.25, -0.15), (-0.03, 0.03), (0.15, 0.25)
 """m, across the profile of the sphere on its ground."""
@@ -18,14 +18,8 @@ READ = ("step", "angle", "opening", "radius", "straightness", "point_to_point", 
 
 @pytest.mark.parametrize("kind", REGIONS)
 def test_a_measure_of_any_kind_is_drawn_with_its_regions(kind: Kind, qtbot: QtBot) -> None:
-    session = small_session(rendered=True)
-    assert session.shown is not None
-    session.shown.measurements = small_measurements()
-    panel = ResultsPanel(session)
-    qtbot.addWidget(panel)
-    panel.resize(1366, 420)
-    panel.show()
-    qtbot.waitExposed(panel)
+    panel = measured_results(qtbot)
+    session = panel.session
     panel.figures.setCurrentIndex(PART)
     regions = PLACES[len(REGIONS[kind])]
     session.set(("measures",), (Gauge(name="one", kind=kind, regions=regions),))

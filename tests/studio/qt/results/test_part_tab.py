@@ -22,7 +22,7 @@ from studio.qt.results.results_panel import PART, REGION, ResultsPanel
 from studio.scan.gauging import readings
 from studio.scan.region import Region
 from studio.scan.sheet_lean import sheet_lean
-from tests.studio.qt.small_session import small_measurements, small_session
+from tests.studio.qt.small_session import measured_results
 
 SIDES = ((-0.25, -0.15), (0.15, 0.25))
 """m, of the ground beside the sphere."""
@@ -33,14 +33,7 @@ SELDOM_MS = 20
 @pytest.fixture
 def panel(qtbot: QtBot) -> ResultsPanel:
     """The small sphere, measured, on the screen."""
-    session = small_session(rendered=True)
-    assert session.shown is not None
-    session.shown.measurements = small_measurements()
-    made = ResultsPanel(session)
-    qtbot.addWidget(made)
-    made.resize(1366, 420)
-    made.show()
-    qtbot.waitExposed(made)
+    made = measured_results(qtbot)
     # axes are fitted to the profile as they are painted, which a busy machine does late
     qtbot.waitUntil(lambda: made.profile.plot.vb.width() > 100 and shows(made.profile, *(1e3 * np.ravel(SIDES))))
     return made
