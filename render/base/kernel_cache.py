@@ -32,23 +32,26 @@ KNOWN_NUMBA = "0.68."
 """Versions of numba whose inside `kernel_dispatcher` was made for, and is tested with."""
 CALLEE = ".callee"
 """End of the names of files that hold what kernels call, which go as soon as all kernels are there."""
+MARKS = b"njit", b"peak_kernel", b"intrinsic"
 IMPORT = re.compile(rb"^from ((?:render|analysis)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
-KERNEL = re.compile(rb"^\s*@(?:(?:numba\.)?njit|peak_kernel|intrinsic)\b", re.MULTILINE)
+KERNEL = re.compile(rb"^[ \t]*@(?:(?:numba\.)?njit|peak_kernel|intrinsic)\b", re.MULTILINE)
 CONSTANT = re.compile(rb"\b(?:[A-Z][A-Z0-9_]+|Flag)\b")
 _handing_over: list[bool] = []
 
 
 def source_key(root: Path = ROOT) -> str:
     """16 hexadecimal digits of all files in `render` and `analysis` with kernels, or with constants of kernels."""
-    texts = {}
+    texts, above = {}, len(os.path.join(root, ""))
     for room in ROOMS:
         for folder, _, names in os.walk(root / room):
             for name in names:
                 if name.endswith(".py"):
                     path = os.path.join(folder, name)
-                    with open(path, "rb") as file:
-                        texts[os.path.relpath(path, root).replace(os.sep, "/")] = file.read()
-    kernels = {path for path, text in texts.items() if KERNEL.search(text)}
+                    with open(path, "rb", buffering=0) as file:
+                        texts[path[above:].replace(os.sep, "/")] = file.read()
+    # a plain search for the words first: every start of the program waits for this
+    marked = {path: text for path, text in texts.items() if any(mark in text for mark in MARKS)}
+    kernels = {path for path, text in marked.items() if KERNEL.search(text)}
     sources = {
         found[1].decode().replace(".", "/") + ".py"
         for path in kernels

@@ -52,6 +52,20 @@ def can_change(session: Session) -> bool:
     return scene_edits.in_list(session.selection) and _exists(session)
 
 
+def undo(session: Session) -> None:
+    """Take the last edit back, and say which: what was told of it does not hold any more."""
+    if label := session.document.undo_label:
+        session.document.undo()
+        session.message.emit("info", f"undone: {label}")
+
+
+def redo(session: Session) -> None:
+    """Make the edit again that was taken back last."""
+    if label := session.document.redo_label:
+        session.document.redo()
+        session.message.emit("info", f"done again: {label}")
+
+
 def remove(session: Session) -> None:
     """Remove all that is selected; a neighbour is selected."""
     if can_change(session):

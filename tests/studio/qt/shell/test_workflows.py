@@ -127,6 +127,16 @@ def test_undo_ten_steps_and_redo_them(window: MainWindow, qtbot: QtBot) -> None:
         assert session.project is state
 
 
+def test_what_was_told_of_an_edit_does_not_outlive_it(window: MainWindow, qtbot: QtBot) -> None:
+    told: list[str] = []
+    window.session.message.connect(lambda _, text: told.append(text))
+    window.session.set((*LASER, "power"), 0.002, "change power")
+    qtbot.keyClick(window, Qt.Key.Key_Z, CTRL)
+    qtbot.keyClick(window, Qt.Key.Key_Z, CTRL | SHIFT)
+    qtbot.keyClick(window, Qt.Key.Key_Z, CTRL | SHIFT)
+    assert told == ["undone: change power", "done again: change power"]
+
+
 def test_render_and_read_the_error(window: MainWindow, qtbot: QtBot) -> None:
     shown = render(window, qtbot)
     one = shown.measurements["likelihood"][0]
