@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.report.colour import TRUTH, method_colour, method_name
+from analysis.report.colour import MUTED, TRUTH, method_colour, method_name
 from analysis.report.frame_result import Extraction, LaserResult
 from analysis.report.style import WIDTH, figure, png_uri
+from analysis.report.units import counted
 from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.frame import LaserCurve
@@ -24,6 +25,10 @@ CROP = (12, 8)
 BAND, BAND_LABEL = "#dce2e8", "±2 predicted sigma"
 GAP = 4.0
 """Neighbouring true crossings farther apart than this many px are not joined."""
+APART = 10.0
+"""Times the usual step from point to point, beyond which the band of sigma is not drawn across."""
+MARGIN = 0.04
+"""Of what is shown, left free on either side of it."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +162,46 @@ def _draw_line(axes: Any, curve: LaserCurve, width: float) -> None:
     axes.plot(pixels[:, 0], pixels[:, 1], color=TRUTH, lw=width, alpha=0.85, solid_capstyle="butt")
 
 
+def on_line(extraction: Extraction) -> NDArray[np.bool_]:
+    """(n,) points that a plot has to show: those of the true line, or all that are measured where none is.
+
+    A stray point of another scan line, or half an image off, would leave the line itself no room.
+    """
+    errors, valid = extraction.errors, extraction.points.valid
+    of_line = valid & np.isfinite(errors.position) & ~errors.outlier
+    return of_line if of_line.any() else valid
+
+
+def _show(axes: Any, along: str, shown: Float, every: Float) -> None:
+    """Bring the `shown` values of an axis into view, and tell how many of `every` are outside."""
+    shown, every = shown[np.isfinite(shown)], every[np.isfinite(every)]
+    if len(shown) == 0:
+        return
+    low, high = float(shown.min()), float(shown.max())
+    margin = MARGIN * max(high - low, 1e-3 * abs(high), 1e-3)
+    low, high = low - margin, high + margin
+    (axes.set_xlim if along == "x" else axes.set_ylim)(low, high)
+    _tell_outside(axes, int(np.count_nonzero((every < low) | (every > high))))
+
+
+def _tell_outside(axes: Any, outside: int) -> None:
+    if outside:
+        axes.annotate(
+            f"{counted(outside, 'point')} outside", (1.0, 1.0), (-3, -3), xycoords="axes fraction",
+            textcoords="offset points", ha="right", va="top", fontsize=6.5, color=MUTED,
+        )  # fmt: skip
+
+
+def _band(at: Float, half: Float) -> tuple[Float, Float]:
+    """(n,) places and half widths of a band in their order, with NaN where neighbours are far apart."""
+    order = np.argsort(at, kind="stable")
+    at, half = at[order].astype(np.float64), half[order]
+    step = np.diff(at)
+    usual = float(np.median(step[step > 0.0])) if np.any(step > 0.0) else np.inf
+    gaps = np.flatnonzero(step > APART * usual) + 1
+    return np.insert(at, gaps, np.nan), np.insert(half, gaps, np.nan)
+
+
 def three_panel_figure(laser: LaserResult) -> str:
     """After the founding paper: the line's position, the depth found from it, and its difference from the truth."""
     curve, rows = laser.curve, laser.curve.axis == "rows"
@@ -177,14 +222,24 @@ def three_panel_figure(laser: LaserResult) -> str:
             depth.plot(points.depth_z * 1e3, index, ".", ms=1.7, mew=0, color=colour)
             error = errors.depth * 1e6
             if extraction is laser.extractions[0]:
-                down = np.argsort(index, kind="stable")
-                band = 2e6 * points.sigma_depth[down]
-                difference.fill_betweenx(index[down], -band, band, color=BAND, lw=0, label=BAND_LABEL, zorder=0.9)
+                down, band = _band(index.astype(np.float64), np.where(np.isfinite(error), 2e6 * points.sigma_depth, np.nan))
+                difference.fill_betweenx(down, -band, band, color=BAND, lw=0, label=BAND_LABEL, zorder=0.9)
             faded = 1.0 if extraction is laser.extractions[0] else 0.3
             difference.plot(np.clip(error, -limit, limit), index, ".", ms=1.7, mew=0, color=colour, alpha=faded)
             off = np.abs(error) > limit
             difference.plot(np.sign(error[off]) * limit, index[off], "x", ms=3, mew=0.7, color=colour)
         difference.set_xlim(-1.05 * limit, 1.05 * limit)
+        measured = [(e.points, on_line(e)) for e in laser.extractions]
+        alongs = [points.pixel[:, 0 if rows else 1] for points, _ in measured]
+        depths = [points.depth_z * 1e3 for points, _ in measured]
+        indices = [points.index.astype(np.float64) for points, _ in measured]
+        for axes, way, truth, of_each in (
+            (position, "x", curve.position, alongs),
+            (depth, "x", curve.depth_z * 1e3, depths),
+            (difference, "y", curve.index.astype(np.float64), indices),
+        ):
+            seen = [of[here] for of, (_, here) in zip(of_each, measured, strict=True)]
+            _show(axes, way, np.concatenate([truth, *seen]), of_each[0])
         if not position.yaxis_inverted():
             position.invert_yaxis()
         name = "u" if rows else "v"
@@ -208,7 +263,7 @@ def profile_figure(laser: LaserResult, T_camera_laser: Float) -> str:
     true = transform_points(T_laser_camera, curve.point) * 1e3
     found = transform_points(T_laser_camera, first.points.camera) * 1e3
     colour = method_colour(first.line.method)
-    every = np.concatenate([true[:, 1:], found[first.points.valid][:, 1:]])
+    every = np.concatenate([true[:, 1:], found[on_line(first)][:, 1:]])
     low, high = (every.min(axis=0), every.max(axis=0)) if len(every) else (np.zeros(2), np.ones(2))
     centre, span = (low + high) / 2, np.maximum(1.06 * (high - low), 1e-3)
     tall = float(np.clip(AXES_WIDTH * span[1] / span[0], 1.5, 3.3))
@@ -222,8 +277,8 @@ def profile_figure(laser: LaserResult, T_camera_laser: Float) -> str:
         profile.legend(loc="best", markerscale=5)
         signed, sigma = first.errors.off_surface * 1e6, first.errors.sigma_off_surface * 1e6
         limit = robust_limit([signed])
-        order = np.argsort(found[:, 1])
-        error.fill_between(found[order, 1], -2 * sigma[order], 2 * sigma[order], color=BAND, lw=0, label=BAND_LABEL)
+        across, band = _band(found[:, 1], 2 * sigma)
+        error.fill_between(across, -band, band, color=BAND, lw=0, label=BAND_LABEL)
         error.axhline(0, color=TRUTH, lw=1.2)
         error.plot(found[:, 1], np.clip(signed, -limit, limit), ".", ms=1.6, mew=0, color=colour)
         off = np.abs(signed) > limit
@@ -234,6 +289,8 @@ def profile_figure(laser: LaserResult, T_camera_laser: Float) -> str:
         box = profile.get_window_extent()
         half = max(span[0] / box.width, span[1] / box.height) / 2 * np.array([box.width, box.height])  # to scale
         profile.set(xlim=centre[0] + [-half[0], half[0]], ylim=centre[1] + [half[1], -half[1]])
+        beyond = (np.abs(found[first.points.valid, 1:] - centre) > half).any(axis=1)
+        _tell_outside(profile, int(np.count_nonzero(beyond)))
         return png_uri(made)
 
 

@@ -41,6 +41,7 @@ from render.scene.shape import MeshFile
 from render.sensor.sensor import Processing
 
 MOST_STEPS = 24
+FALSE_ARE = " (off the surface only: they have no true position or depth)"
 MEASURE_COLUMNS = ("n", "bias", "sigma", "RMSE", "robust sigma", "P95", "outliers", "lag 1", "within ±2 sigma")
 
 
@@ -72,7 +73,7 @@ def measure_tables(report: ReportInput) -> list[MethodTable]:
                 ("with a line to be seen", count(found.truth_rows)),
                 ("with a point", count(found.valid_rows)),
                 ("rightly measured", f"{count(found.measured_rows)} ({percent(found.completeness)})"),
-                ("with a point but no line", count(found.false_rows)),
+                ("with a point but no line", f"{count(found.false_rows)}{FALSE_ARE if found.false_rows else ''}"),
                 *([("with neither, but a peak", count(found.depthless_rows))] if found.depthless_rows else []),
             ]
             tables.append(MethodTable(prefix + method_name(found.method), method_colour(found.method), rows, lines))

@@ -95,7 +95,7 @@ def details(record: dict[str, Any]) -> list[str]:
             f"{counts[name]} {SIDES.get(name, name)}" for name in ("within", "undecided", "above", "below")
         )
         told.append(f"{percent(record['share_beyond'], 2)} of the points are out of the tolerance's band")
-        told.append(f"{MARKS[record['verdict']]} by ISO 14253-1, within by two sigma: {shares}")
+        told.append(f"{MARKS[record['verdict']]} by ISO 14253-1{_without_far(record)}, within by two sigma: {shares}")
         told.append(_what_is_out(record, record["undecided_but_beyond"]))
     if record["median_sigma"] is not None:
         at_most = " at most" if record["sigma_is_bound"] else ""
@@ -106,11 +106,21 @@ def details(record: dict[str, Any]) -> list[str]:
     return told
 
 
+def _without_far(record: dict[str, Any]) -> str:
+    """The verdict of the others, where those that are far off decide; empty: they do not."""
+    without, far = record["verdict_without_far"], round(record["share_false"] * record["points"])
+    if without == record["verdict"]:
+        return ""
+    return f" ({MARKS[without]} without the {counted(far, 'point')} far off)"
+
+
 def _what_is_out(record: dict[str, Any], alone: int) -> str:
     """The rule for what is outside or inside, and how many points come to less than it."""
     surely, points = record["coverage_beyond"], record["points"]
-    rule = f"Outside and inside are places, not points: beyond by {surely:.1f} sigma, which chance does as rarely to"
-    told = f"{rule} any of {points} points as two sigma to one, the median around beyond as well, and no edge beside"
+    told = (
+        f"A place is outside or inside where a point is beyond by {surely:.1f} sigma (as rare by chance among {points} "
+        "points as two sigma of one), most of those around it are beyond too, and no edge is beside it"
+    )
     if not alone:
         return told
     are = "is" if alone == 1 else "are"

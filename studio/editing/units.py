@@ -15,10 +15,11 @@ FACTORS = {
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "in": 0.0254},
     "m2": {"mm²": 1e-6, "mm2": 1e-6, "cm2": 1e-4, "m2": 1.0},
     "rad": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "°": math.pi / 180},
+    "deg": {"deg": 1.0, "°": 1.0, "rad": 180 / math.pi, "mrad": 0.18 / math.pi},
     "W": {"W": 1.0, "mW": 1e-3, "uW": 1e-6, "µW": 1e-6},
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
 }
-"""Units that may be typed, by the SI unit that is stored."""
+"""Units that may be typed, by the one that is stored: the SI unit, but for angles of a pose in degrees."""
 SHOWN = {"m": "mm", "m2": "mm²", "rad": "deg", "W": "mW", "s": "ms"}
 LENGTHS = ("mm", "um", "cm", "m", "in")
 """Units that lengths may be shown in."""
@@ -91,6 +92,10 @@ class Unit:
         if not (math.isfinite(stored) and math.isfinite(stored * self.factor)):
             raise InputError("the number is too large", found=text.strip())
         return stored
+
+
+DEGREES = Unit("deg", "deg", 1.0)
+"""Of the rotation of a pose, which is kept and shown in them."""
 
 
 def _grouped(text: str) -> str:

@@ -135,10 +135,11 @@ class Compared:
         robust = robust_sigma(value)
         far = far_off(value)
         shift, turn = turn_and_shift(aligned.motion, self.found.points)
-        counts, alone = None, None
+        counts, alone, without = None, None, None
         if self.verdicts is not None:
             counts = {name: int(np.count_nonzero(self.verdicts == key)) for key, name in NAMES.items()}
             alone = int(np.count_nonzero(self.beyond & (self.verdicts == UNDECIDED)))
+            without = verdict_of(self.verdicts[~far])
         return {
             "format": FORMAT,
             "format_version": VERSION,
@@ -175,6 +176,7 @@ class Compared:
             "coverage": COVERAGE,
             "coverage_beyond": coverage_of_all(len(value)),
             "verdict": None if self.verdicts is None else verdict_of(self.verdicts),
+            "verdict_without_far": without,
         }
 
 

@@ -82,6 +82,11 @@ class Render:
         """More of its light is to come by itself."""
         return not self.final and self.state is None and not self.stopped
 
+    @property
+    def is_kept_nowhere(self) -> bool:
+        """A person made it, and it goes with the session."""
+        return self.asked and not (self.kept or self.scan or self.cell or self.refining)
+
     def developed_by(self, now: Project) -> Project:
         """The project, at full scale, by whose sensor, power and extraction it is developed and measured."""
         return self.source if self.cell and self.source is not None else now

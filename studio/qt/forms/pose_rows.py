@@ -14,7 +14,7 @@ from render.base.pose import Pose
 from studio.editing.euler_angles import euler_angles, rotation_from_euler
 from studio.editing.forms import REQUIRED, FieldSpec, field_path
 from studio.editing.targets import other_frame, rounded
-from studio.editing.units import SHOWN, Unit
+from studio.editing.units import DEGREES, SHOWN, Unit
 from studio.project.document import FieldPath
 from studio.qt.forms.form_rows import Row
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from studio.qt.forms.form import Form
 
 AXES = ("x", "y", "z")
-DEGREES = Unit("", "deg", 1.0)
 
 
 class PoseRow(Row):

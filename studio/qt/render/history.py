@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from analysis.report.style import short
 from render.base.errors import InputError
 from render.output.tone_mapping import Picture, grey
 from render.plan import GroupQuality
@@ -30,6 +31,7 @@ from studio.qt.core.dialogs import ask_removal, show_trouble
 from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.render import Render
 from studio.qt.core.session import Session
+from studio.qt.core.widgets import text_button
 from studio.qt.image.compare_view import CompareView
 from studio.qt.render.kept_list import MARK, Entry, KeptList, kept_lines, kept_tip, place_holder
 from studio.qt.render.python_copy import copy_as_python
@@ -47,6 +49,9 @@ NEW_LINE = "\u2028"
 """Qt breaks an item's text only here."""
 NAMING = "A name keeps no settings: a render is developed as the project is then whenever it is shown."
 KEEPING = "Its light, its settings and its figures as they are read now are kept, whatever the project becomes."
+NAME_CHARACTERS = 16
+"""Of a name that a button has room for."""
+GOING = "Kept nowhere: it goes when the project is closed, saved or not."
 CLOSING = "Out of this session's renders; it stays kept with the project."
 SAMPLED = 512
 """Pixels a side that a thumbnail looks at."""
@@ -169,6 +174,7 @@ class History(QWidget):
         self.delete_button = QPushButton("Delete")
         self.table_button = QPushButton("Table")
         self.table_button.setToolTip("Figures and settings of all renders, and of those kept with the project")
+        self.keep_button = text_button("", f"{GOING}\n{KEEPING}")
         self.broken = QLabel(wordWrap=True)
         self.broken.setObjectName("muted")
         top = QHBoxLayout()
@@ -180,6 +186,7 @@ class History(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addLayout(top)
         layout.addWidget(self.list, 1)
+        layout.addWidget(self.keep_button, 0, Qt.AlignmentFlag.AlignLeft)
         layout.addWidget(self.broken)
         session.renders_changed.connect(self.refresh)
         session.developed.connect(self._new_images)
@@ -194,6 +201,7 @@ class History(QWidget):
         self.compare_button.clicked.connect(self.compare)
         self.delete_button.clicked.connect(self.delete)
         self.table_button.clicked.connect(self.open_table)
+        self.keep_button.clicked.connect(self._keep_selected)
         self._read_kept()
 
     def selected(self) -> list[Entry]:
@@ -352,9 +360,22 @@ class History(QWidget):
         self.session.renders_changed.emit()
 
     def _show_buttons(self) -> None:
-        count = len(self.list.selectedItems())
+        count, going = len(self.list.selectedItems()), self._going()
         self.compare_button.setEnabled(count == 2)
         self.delete_button.setEnabled(count > 0)
+        self.keep_button.setVisible(going is not None)
+        if going is not None:
+            self.keep_button.setText(f"Keep {short(title(going), NAME_CHARACTERS)} with the project")
+
+    def _going(self) -> Render | None:
+        """The one that is selected, where a person made it and it is kept nowhere."""
+        selected = self.selected()
+        render = selected[0] if len(selected) == 1 else None
+        return render if isinstance(render, Render) and render.is_kept_nowhere else None
+
+    def _keep_selected(self) -> None:
+        if (render := self._going()) is not None:
+            self.keep(render)
 
     def _menu(self, where: QPoint) -> None:
         item = self.list.itemAt(where)

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 
 from analysis.cloud import Cloud, cloud
 from analysis.report.frame_result import FrameResult
+from analysis.report.units import counted
 from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.scene.motion import LinearStage, NoMotion, Turntable
@@ -126,7 +127,7 @@ class MotionPanel(QWidget):
         place = self.session.place
         name = unused_name(place, f"{self.session.project.name} scan")
         # the size of a single render is another one
-        size = f"{self.session.project.scene.frame_count} frames at {self.scale.currentText()}"
+        size = f"{counted(self.session.project.scene.frame_count, 'frame')} at {self.scale.currentText()}"
         chosen = ask_results_folder(self, f"Folder for the scan's results: {size}", place, name)
         if chosen is None:
             return

@@ -346,7 +346,8 @@ class PartTab(QWidget):
         elif self.readings and (render := self.session.shown) is not None:
             text = lean_text(render.project.scene, self.laser, render.frame.step, self.session.project.measured_in)
         if self.readings and self.placing is None:
-            text = f"{text} Points are by {method_name(self._method)}, as Extraction says.".strip()
+            before = f"{text.rstrip('.')}. " if text else ""
+            text = f"{before}Points are by {method_name(self._method)}, as Extraction says."
         if self._read and self.placing is None:
             kept = entry is not None and entry["reason"] != OF_SCAN
             text = f"{self._steps.told(gauge, kept, self._read)} {text}".strip()

@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QDialog, QFileDialog, QMenu, QWidget
 
+from analysis.report.units import counted
 from render.base.errors import InputError
 from studio.editing.units import Unit
 from studio.project.autosave import Autosave, Recovery, find, find_of, sweep
@@ -321,7 +322,9 @@ class FileActions(QObject):
         self.preferences.add_recent(path)
         now = document.project.name
         called = "" if now == before else f"; the project is now called “{now}” after its file (it was “{before}”)"
-        self.session.message.emit("info", f"Saved {path}{called}")
+        going = sum(render.is_kept_nowhere for render in self.session.renders)
+        renders = f"; {counted(going, 'render')} of this session not kept with it: Keep, in Render" if going else ""
+        self.session.message.emit("info", f"Saved {path}{called}{renders}")
         return True
 
     def _name_in(self, path: Path) -> str | None:

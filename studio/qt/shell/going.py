@@ -55,7 +55,7 @@ def what_goes(session: Session, runner: JobRunner, panels: Panels, *, quits: boo
     asked = job is not None and job.name == "render" and panels["render"].asked and not job.cancel_asked  # type: ignore[attr-defined]
     done = percent(job.done, 0) if asked and job is not None else ""
     told = f"A render is under way, {done} of it done, and is lost." if done else ""
-    made = [one for one in session.renders if one.asked and not (one.kept or one.scan or one.cell or one.refining)]
+    made = [one for one in session.renders if one.is_kept_nowhere]
     seconds = sum(sum(one.frame.seconds.values()) for one in made)
     return Going(told, len(made), seconds, _calibration(session) if quits else "")
 

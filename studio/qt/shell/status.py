@@ -19,6 +19,7 @@ SHORT = 0.4
 """Seconds; work that ends sooner is not worth a progress bar."""
 WIDEST, MARGIN = 720, 6
 """px, of a message that stands above the bar."""
+IDLE = "Nothing is being computed"
 MESSAGE_SECONDS = {"info": 8, "warning": 20, "error": 60}
 
 
@@ -87,13 +88,17 @@ class StatusBar(QStatusBar):
 
     def toggle_pause(self) -> None:
         """Hold the job that is shown, or let it go on."""
-        if self.job is not None:
+        if self.job is None:
+            self.session.message.emit("info", IDLE)
+        else:
             self.job.resume() if self.job.state is State.PAUSED else self.job.pause()
             self.runner.progress.emit(self.job)  # for the panel that has such a button as well
 
     def cancel_work(self) -> None:
         """Stop the job that is shown; what it has given so far stays."""
-        if self.job is not None:
+        if self.job is None:
+            self.session.message.emit("info", IDLE)
+        else:
             self.job.cancel()
             self.follow(self.job)
 

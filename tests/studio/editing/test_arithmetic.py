@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from render.base.errors import InputError
-from studio.editing.units import Unit
+from studio.editing.units import DEGREES, Unit
 
 LENGTH, ANGLE = Unit.of("m"), Unit.of("rad")
 
@@ -34,6 +34,9 @@ def test_an_expression_is_worked_out_in_the_units_of_its_parts(text: str, metres
 
 def test_the_units_are_those_of_the_field() -> None:
     assert ANGLE.parse("90/2") == pytest.approx(0.785398163397, rel=1e-11)
+    assert DEGREES.parse("-0.5 rad") == pytest.approx(-28.64788975654, rel=1e-11)
+    assert DEGREES.parse("90 - 100 mrad") == pytest.approx(84.27042204869, rel=1e-11)
+    assert (DEGREES.parse("45°"), DEGREES.parse("45"), DEGREES.format(-12.5)) == (45.0, 45.0, "-12.5")
     assert Unit("px", "px").parse("10 px + 5") == 15.0
     assert Unit("", "").parse("3*7") == 21.0
     assert Unit("W/sr", "W/sr").parse("5 W/sr") == 5.0

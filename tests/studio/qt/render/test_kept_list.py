@@ -155,6 +155,20 @@ def test_a_render_of_the_session_is_marked_once_it_is_kept(qtbot: QtBot, tmp_pat
     assert menu(history, 0) == ["Open", "Rename", "Compare", "Remove from the project…"]
 
 
+def test_one_that_is_kept_nowhere_says_so_and_is_kept_by_a_click(qtbot: QtBot, tmp_path: Path) -> None:
+    """Two renders went when the program ended, and the only word of it was in a menu of their list."""
+    session, (world, frame) = session_in(tmp_path), small_render()
+    history = list_of(qtbot, session)
+    history.show()
+    session.add_render(Render(1, session.project, world, frame))
+    assert history.keep_button.text() == "Keep Render 1 with the project" and history.keep_button.isVisible()
+    assert "it goes when the project is closed" in history.keep_button.toolTip()
+    qtbot.mouseClick(history.keep_button, Qt.MouseButton.LeftButton)
+    assert session.renders[0].kept is not None and not history.keep_button.isVisible()
+    session.add_render(Render(2, session.project, world, frame, asked=False))
+    assert not history.keep_button.isVisible(), "the program's own first picture is no work of a person"
+
+
 def test_a_kept_render_goes_from_the_disk_only_when_it_is_confirmed(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
