@@ -222,7 +222,8 @@ def three_panel_figure(laser: LaserResult) -> str:
             depth.plot(points.depth_z * 1e3, index, ".", ms=1.7, mew=0, color=colour)
             error = errors.depth * 1e6
             if extraction is laser.extractions[0]:
-                down, band = _band(index.astype(np.float64), np.where(np.isfinite(error), 2e6 * points.sigma_depth, np.nan))
+                sigma = np.where(np.isfinite(error), 2e6 * points.sigma_depth, np.nan)
+                down, band = _band(index.astype(np.float64), sigma)
                 difference.fill_betweenx(down, -band, band, color=BAND, lw=0, label=BAND_LABEL, zorder=0.9)
             faded = 1.0 if extraction is laser.extractions[0] else 0.3
             difference.plot(np.clip(error, -limit, limit), index, ".", ms=1.7, mew=0, color=colour, alpha=faded)

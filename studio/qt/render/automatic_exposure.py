@@ -11,7 +11,7 @@ from studio.project.project import Project
 from studio.qt.core.live_preview import live
 from studio.qt.core.render import Render
 from studio.qt.core.session import Session
-from studio.qt.render.history import title
+from studio.qt.render.render_row import title
 from studio.scan.exposure import filling_exposure
 from studio.scan.redevelop import development
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-from PySide6.QtCore import QItemSelectionModel, QModelIndex, QPersistentModelIndex, QPoint, QSize, Qt
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, QPersistentModelIndex, QPoint, Qt
 from PySide6.QtGui import QColor, QIcon, QImage, QPalette, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -23,8 +22,6 @@ from PySide6.QtWidgets import (
 
 from analysis.report.style import short
 from render.base.errors import InputError
-from render.output.tone_mapping import Picture, grey
-from render.plan import GroupQuality
 from studio.qt.core import theme
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.dialogs import ask_removal, show_trouble
@@ -35,13 +32,12 @@ from studio.qt.core.widgets import text_button
 from studio.qt.image.compare_view import CompareView
 from studio.qt.render.kept_list import MARK, Entry, KeptList, kept_lines, kept_tip, place_holder
 from studio.qt.render.python_copy import copy_as_python
+from studio.qt.render.render_row import THUMBNAIL, describe, in_short, named, thumbnail, title
 from studio.qt.render.render_table import RenderTable, keep_render, open_render
 from studio.runtime.error_messages import trouble
 from studio.scan.kept_renders import Kept, remove
-from studio.scan.remarks import scale_name, scale_notes
+from studio.scan.remarks import scale_notes
 
-THUMBNAIL = QSize(48, 40)
-"""As high as the text beside it."""
 ENTRIES = 3
 """To be seen at once."""
 ENTRY_HEIGHT = THUMBNAIL.height() + 4
@@ -53,79 +49,6 @@ NAME_CHARACTERS = 16
 """Of a name that a button has room for."""
 GOING = "Kept nowhere: it goes when the project is closed, saved or not."
 CLOSING = "Out of this session's renders; it stays kept with the project."
-SAMPLED = 512
-"""Pixels a side that a thumbnail looks at."""
-
-
-def title(render: Entry) -> str:
-    """As the list shows it."""
-    return render.name if isinstance(render, Kept) else render.name or f"Render {render.number}"
-
-
-def named(render: Render) -> str:
-    """Its title, with its image scale where that is not the scanner's."""
-    return title(render) + (f" ({render.scanner_scale:.3g} x)" if render.scanner_scale != 1.0 else "")
-
-
-def describe(render: Render) -> str:
-    """Size, time and quality, in one line."""
-    ambient, settings = render.frame.quality_of("ambient"), render.project.render
-    asked = f" reached, {settings.laser_error:.2%} asked" if settings.goal is None else " reached by the depth's goal"
-    parts = [*_size_and_time(render), *(one + asked for one in _laser(render))]
-    if ambient is not None:
-        # fewer than each pixel was to have: the others take theirs from neighbours
-        few = ", as most are interpolated" * (ambient.work < settings.ambient_samples)
-        parts.append(
-            f"ambient {_samples(ambient)} samples a pixel reached on average, {settings.ambient_samples} asked{few}"
-        )
-    return ", ".join(parts)
-
-
-def in_short(render: Render) -> list[str]:
-    """The same in two lines that a narrow list has room for."""
-    ambient = render.frame.quality_of("ambient")
-    quality = [*_laser(render), *([] if ambient is None else [f"ambient {_samples(ambient)}/px"])]
-    reached = f"reached: {', '.join(quality)}" if quality else ""
-    return [", ".join(_size_and_time(render)), reached]
-
-
-def _samples(ambient: GroupQuality) -> str:
-    return f"{ambient.work:.{0 if ambient.work >= 10.0 else 1}f}"
-
-
-def _laser(render: Render) -> list[str]:
-    errors = [
-        one.error if one.image_error is None else one.image_error
-        for one in render.frame.quality
-        if one.group == "direct"
-    ]
-    return [f"laser {max(errors):.2%}"] if errors else []
-
-
-def _size_and_time(render: Render) -> list[str]:
-    height, width = render.frame.shape
-    small = scale_name(render.scanner_scale)
-    parts = [f"{width} x {height}" + (f", {small}" if small else "")]
-    if render.scan is not None:
-        parts.insert(0, f"step {render.frame.step + 1} of {render.scan.count}")
-    parts.append(f"{sum(render.frame.seconds.values()):.1f} s")
-    if not render.final:
-        parts.append("under way" if render.refining else "stopped early, Continue goes on")
-    return parts
-
-
-def thumbnail(render: Render) -> Picture | None:
-    """A small picture of the developed image, the brightest of each block so that the line stays; None: not yet."""
-    if not render.images:
-        return None
-    image = render.images[0]
-    pixels = image.grey
-    stride = max(1, max(pixels.shape) // SAMPLED)
-    pixels = pixels[::stride, ::stride]
-    block = max(1, min(pixels.shape[1] // THUMBNAIL.width(), pixels.shape[0] // THUMBNAIL.height()))
-    rows, columns = pixels.shape[0] // block, pixels.shape[1] // block
-    blocks = pixels[: rows * block, : columns * block].reshape(rows, block, columns, block)
-    return grey(np.ascontiguousarray(blocks.max(axis=(1, 3))), image.black_level, image.saturation, bright=True)
 
 
 class _ThreeLines(QStyledItemDelegate):

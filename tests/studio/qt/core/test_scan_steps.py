@@ -18,8 +18,8 @@ from studio.project.project import Project
 from studio.qt.core.jobs import RENDER
 from studio.qt.core.render import Render
 from studio.qt.render import motion_panel
-from studio.qt.render.history import describe
 from studio.qt.render.motion_panel import MotionPanel
+from studio.qt.render.render_row import describe
 from studio.qt.render.render_table import RenderTable
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell import file_actions

@@ -15,7 +15,8 @@ from render.base.errors import InputError
 from studio.project.document import Document
 from studio.qt.core.render import Render
 from studio.qt.core.session import Session
-from studio.qt.render.history import History, describe, in_short, title
+from studio.qt.render.history import History
+from studio.qt.render.render_row import describe, in_short, title
 from studio.qt.render.render_table import FEWEST_PX, RenderTable, as_kept, keep_render, open_render
 from studio.scan.kept_renders import Kept, kept_renders
 from studio.scan.redevelop import develop_again, development, measure_again

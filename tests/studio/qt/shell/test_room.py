@@ -29,7 +29,7 @@ from studio.qt.core import theme
 from studio.qt.core.render import Render
 from studio.qt.core.session import one_of
 from studio.qt.core.widgets import ElidedLabel
-from studio.qt.render.history import in_short
+from studio.qt.render.render_row import in_short
 from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.window import MainWindow
 from studio.qt.shell.workspaces import WORKSPACES, sealed
