@@ -108,8 +108,8 @@ class History(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addLayout(top)
+        layout.addWidget(self.keep_button)  # above the list, whose end is out of sight on a small screen
         layout.addWidget(self.list, 1)
-        layout.addWidget(self.keep_button, 0, Qt.AlignmentFlag.AlignLeft)
         layout.addWidget(self.broken)
         session.renders_changed.connect(self.refresh)
         session.developed.connect(self._new_images)
