@@ -150,6 +150,9 @@ class GroupQuality:
     out_of_reach: bool = False
     """Of the line: its goal would have taken far more work than is allowed, or than the error of the image, which was
     rendered in its place."""
+    spread: float | None = None
+    """Of indirect light for the line: the share that was spread about its place, as it was a peak beside the line by
+    the light of one pass alone; None: it is for the image."""
     lines: int | None = None
     """Of the line: scan lines with a line."""
     unknown: int | None = None

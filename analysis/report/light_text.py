@@ -119,7 +119,8 @@ def quality_text(quality: GroupQuality) -> str:
         case "samples a pixel":
             parts.append(f"{quality.work:.{0 if quality.coarse_error is None else 1}f} of {quality.most:.0f} samples")
     if quality.share is not None:
-        parts.append(f"{quality.share:.2%} of the direct light")
+        alone = f", {quality.spread:.0%} of it spread, as one path alone made a peak" if quality.spread else ""
+        parts.append(f"{quality.share:.2%} of the direct light{alone}")
     if quality.clamped is not None:
         parts.append(f"clamped {quality.clamped:.0f} {'times' if quality.laser else 'contributions'} (biased)")
     if quality.invalid:

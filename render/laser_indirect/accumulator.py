@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numba
@@ -24,6 +24,7 @@ from render.laser_indirect.guiding import (
 )
 from render.laser_indirect.line_goal import LineErrors
 from render.laser_indirect.line_paths import PathDemand
+from render.laser_indirect.lone_light import keep_largest, lone_light
 from render.laser_indirect.photon_emission import FanDistribution
 
 PASSES_A_WAVE = 8
@@ -44,7 +45,7 @@ LEAST_STEP = 0.125
 """Of the passes so far, at least, are in the next wave."""
 PIXELS_A_CHUNK = 1 << 17
 Arrays = dict[str, NDArray[Any]]
-IMAGES = ("specular", "camera_paths", "guide_moments", "total", "camera_radiance")
+IMAGES = ("specular", "camera_paths", "guide_moments", "total", "camera_radiance", "largest")
 NO_DEMAND = PathDemand(np.zeros(0), np.zeros(0))
 NUMBERS = (
     *("kinds", "size", "growth_limit", "enough", "camera_share", "squares", "waves", "passes", "weight", "shares"),
@@ -107,6 +108,8 @@ class Accumulator:
     """Pixels of passes that the clamp has lowered."""
     clamped_radiance: float = 0.0
     """Radiance that the clamp took, weighted sum over pixels and passes."""
+    largest: Float32 = field(default_factory=lambda: np.zeros(0, np.float32))
+    """(pixels,) of the sum, the most that a single pass has in it; (0,): no line is the goal."""
     line: LineErrors | None = None
     """Where errors matter, and what they come to there; None: everywhere alike."""
     demand: PathDemand = NO_DEMAND
@@ -156,6 +159,9 @@ class Accumulator:
         weight = self.next_weight
         if self.line is not None:
             self.learn(self.line.add(buffers, weight, growth), growth)
+            if len(self.line.projection.peaks):
+                self.largest = self.largest if len(self.largest) else np.zeros(len(self.total), np.float32)
+                keep_largest(buffers, self.largest, weight, most)
         found = sum_passes(buffers, self.total, self.camera_radiance, weight, most, threads)
         light, by_camera, squares, variance_sum, clamped, clamped_radiance = found
         self.squares += squares
@@ -226,6 +232,12 @@ class Accumulator:
 
         map_chunks(work, len(mean), PIXELS_A_CHUNK)
         return mean.reshape(shape)
+
+    def lone(self, shape: tuple[int, int]) -> Float32 | None:
+        """(h, w) of `radiance`, what is a peak beside the line by one pass alone; None: no line is the goal."""
+        if self.line is None or not len(self.largest):
+            return None
+        return lone_light(self.total, self.largest, self.weight, self.line.projection).reshape(shape)
 
     def arrays(self) -> Arrays:
         """What a checkpoint keeps."""

@@ -41,6 +41,7 @@ from render.laser_indirect.guiding import (
 from render.laser_indirect.lesson import ReflectedLesson
 from render.laser_indirect.line_goal import Weigh
 from render.laser_indirect.line_paths import alike_on_a_line
+from render.laser_indirect.lone_light import spread
 from render.laser_indirect.path_vertex import ALL_KINDS
 from render.laser_indirect.photon_emission import FAN_BINS, FanDistribution, guided_fan, uniform_fan, visible_fan_range
 from render.run import Run
@@ -84,6 +85,8 @@ class IndirectImage:
     """Scan lines with a line; None: no error of theirs is asked for."""
     unknown: int | None = None
     """Those whose own estimated deviation is above the allowed one."""
+    spread: float | None = None
+    """Share of the light that was spread, as single paths would have been peaks; None: no line is the goal."""
 
 
 @dataclass(frozen=True)
@@ -146,13 +149,15 @@ def indirect_images(
     def image() -> IndirectImage:
         counts = so_far.paths, round(so_far.invalid) + clear.invalid, round(so_far.clamped)
         clamped_radiance = so_far.clamped_radiance / so_far.weight / so_far.total.size
+        radiance, share = with_lone_spread(so_far, shape)
         found = IndirectImage(
-            clear.added_to(so_far.radiance(shape), kinds),
+            clear.added_to(radiance, kinds),
             clear.error_with(so_far, kinds),
             *counts,
             clamped_radiance,
             math.hypot(so_far.line_deviation, clear_deviation),
             given_up(),
+            spread=share,
         )
         line = so_far.line
         if line is None:
@@ -199,6 +204,18 @@ def indirect_images(
             yield image()
     run.teach(run.part, ReflectedLesson.of(so_far))
     yield image()
+
+
+def with_lone_spread(so_far: Accumulator, shape: tuple[int, int]) -> tuple[Float32, float | None]:
+    """(h, w) radiance so far, with the peaks of single passes spread, and the share of it that was; None: no line is
+    the goal."""
+    radiance, lone = so_far.radiance(shape), so_far.lone(shape)
+    if lone is None:
+        return radiance, None
+    moved, whole = float(lone.sum(dtype=np.float64)), float(radiance.sum(dtype=np.float64))
+    if not moved > 0.0:
+        return radiance, 0.0
+    return np.maximum(radiance - lone, 0.0) + spread(lone), moved / whole
 
 
 class Waves:

@@ -130,6 +130,7 @@ def quality_of(
         of="image" if allowed is None else "line",
         image_error=None if allowed is None else image.error,
         image_target=None if allowed is None else settings.indirect_error,
+        spread=image.spread,
         lines=image.lines,
         unknown=image.unknown,
         out_of_reach=image.out_of_reach,
