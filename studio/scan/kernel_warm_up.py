@@ -316,6 +316,7 @@ def _aim(scene: Scene, cancelled: Cancel) -> None:
     from render.laser_indirect.line_goal import Effect, LineErrors
     from render.laser_indirect.line_paths import PathDemand
     from render.laser_indirect.line_sums import mean_image
+    from render.laser_indirect.lone_light import keep_largest, lone_light
     from render.world.placed import PlacedScene
     from render.world.world import build_world
 
@@ -324,9 +325,10 @@ def _aim(scene: Scene, cancelled: Cancel) -> None:
     everywhere = Importance((ones,), ones, peaks=(ones,))
     buffers, errors = [empty_buffer(ones.size) for _ in range(PASSES_A_WAVE)], LineErrors.of(everywhere, 0)
     buffers[0].touched[:] = True
-    mean_image(buffers)
+    keep_largest(buffers, mean_image(buffers), 1.0, 1.0)
     Effect.of(errors.projection, buffers)
     paths = np.ones(ones.size)
+    lone_light(paths, ones.ravel(), 1.0, errors.projection)
     demand = PathDemand.none(errors.projection).learned(errors.projection, errors.spread(buffers), paths, 1.0)
     demand.aim(paths, errors.projection, camera.width, 1.0)
     list(measured_images(PlacedScene(world, scene), everywhere, most=LEAST_SAMPLES, run=run))
