@@ -121,9 +121,9 @@ def lens_sentence(terms: int, trials: Sequence[LensTrial]) -> str:
     tried = "; ".join(_trial_words(one, trials, terms) for one in trials)
     depth = ", how far off its boards depth was" if any(one.depth for one in trials) else ""
     return (
-        f"{terms} distortion terms: no lens with more is proved better on views that were left out of its fit. Each "
-        f"lens with the mean squared residual there{depth}, and the chance p that noise alone makes one with more "
-        f"terms seem as good (proved: under {PROOF:g}): {tried}"
+        f"{terms} distortion terms: the fewest to which no lens with more is proved better on views that were left out "
+        f"of its fit. Each lens with the mean squared residual there{depth}, and p, the chance that noise alone makes "
+        f"a lens with more terms seem so much better (below {PROOF:g} more terms are proved to help): {tried}"
     )
 
 

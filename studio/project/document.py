@@ -11,7 +11,9 @@ from pydantic import BaseModel, ValidationError
 
 from render.base.errors import InputError
 from render.base.files import sha256
+from studio.project.input_files import input_files
 from studio.project.project import Project
+from studio.project.templates import FOLDER as TEMPLATES
 from studio.project.validation_messages import input_error
 
 FieldPath = tuple[str | int, ...]
@@ -51,6 +53,11 @@ class Document:
     def dirty(self) -> bool:
         """There are changes that no file holds."""
         return self.project != self._saved
+
+    @property
+    def files_may_go(self) -> bool:
+        """It has no folder of its own yet: meshes and textures lie where they stay only as long as the window."""
+        return self.path is None and self.root.parent != TEMPLATES and bool(input_files(self.project.scene, self.root))
 
     @property
     def saved(self) -> Project | None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -156,7 +156,20 @@ def open_folder(folder: Path) -> ScanFolder:
             raise InputError(
                 "the frame's description has changed since the scan ended", where=str(file), cure="render again"
             )
-    return ScanFolder(folder, project, (folder / source).resolve(), frames, inputs, manifest)
+    return ScanFolder(folder, project, _root_of(folder, source, inputs), frames, inputs, manifest)
+
+
+def _root_of(folder: Path, source: str, inputs: Mapping[str, str]) -> Path:
+    """Where the manifest says that the input files are; where they are no longer, the scan's folder or the one that it
+    lies in, if they are there as they were: of a project that was saved, or carried along, since."""
+    recorded = (folder / source).resolve()
+    if all((recorded / name).is_file() for name in inputs):
+        return recorded
+    for other in (folder.resolve(), folder.resolve().parent):
+        with suppress(InputError, OSError):
+            if all(sha256(inside(other, name, "input files")) == digest for name, digest in inputs.items()):
+                return other
+    return recorded
 
 
 def image_scale_of(found: ScanFolder) -> float:

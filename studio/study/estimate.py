@@ -24,7 +24,7 @@ A_COLUMN = 5
 
 NOISE_APART = (
     "Values that leave the light as it is (sensor, laser power, extraction) share no render: how well a frame is "
-    "rendered depends on the noise (goal in depth); with the goal of the image they share."
+    "rendered depends on the noise (goal in depth); with the goal “errors of the image” they would share one."
 )
 """Said of values that would share one, had they no goal."""
 
@@ -92,7 +92,10 @@ def _not_shared(cells: Sequence[Cell]) -> tuple[str, ...]:
     methods = {cell.project.extraction.method for cell in cells if cell.project.render.goal is not None}
     if len(methods) < 2:
         return ()
-    return ("Each method has renders of its own, as the goal is its own depth; with the goal of the image they share.",)
+    return (
+        "Each method has renders of its own, as each is rendered for its own depth (goal in depth); with the goal "
+        "“errors of the image” one serves all.",
+    )
 
 
 def _noise_apart(study: Study, cells: Sequence[Cell]) -> tuple[str, ...]:

@@ -188,6 +188,7 @@ def export_csv(parent: QWidget, session: Session, name: str, what: str, write: C
     if not chosen:
         return
     path = Path(chosen)
+    session.chose(path)
     try:
         write(path if path.suffix.lower() == ".csv" else path.with_name(f"{path.name}.csv"))
     except InputError as error:

@@ -5,7 +5,7 @@ Panels never talk to each other: they change the session, and follow its signals
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -26,6 +26,7 @@ from studio.qt.core.render import Render
 from studio.scan.scan_results import ScanResults
 
 if TYPE_CHECKING:
+    from studio.runtime.preferences import PreferencesFile
     from studio.scan.measures_in_3d import MeasureIn3D
 
 Follower = TypeVar("Follower", bound=QObject)
@@ -129,8 +130,8 @@ class Session(QObject):
         """What the panel of the deviation shows in 3D; None: nothing."""
         self.measures_in_3d: tuple[MeasureIn3D, ...] = ()
         """Measures of the part as the results have read them off the shown render."""
-        self.last_folder: Callable[[], str] = str
-        """Where a file was opened or saved last, as the preferences keep it; empty: nowhere yet."""
+        self.preferences: PreferencesFile | None = None
+        """Of the window: they keep where a file was opened or saved last."""
         self.document = document
         document.listeners.append(self.project_changed.emit)
 
@@ -178,8 +179,13 @@ class Session(QObject):
     @property
     def last_place(self) -> Path:
         """Where a file was chosen last, whatever is open; else the person's own folder."""
-        last = self.last_folder()
+        last = "" if self.preferences is None else self.preferences.values.folder
         return Path(last) if last and Path(last).is_dir() else Path.home()
+
+    def chose(self, file: Path) -> None:
+        """A file, or a folder of results, was chosen: dialogs of a project that is not saved begin beside it."""
+        if self.preferences is not None and str(file.parent) != self.preferences.values.folder:
+            self.preferences.change(folder=str(file.parent))
 
     def replace_document(self, document: Document) -> None:
         """Open another project: history and selection start anew."""

@@ -286,9 +286,10 @@ class History(QWidget):
         count, going = len(self.list.selectedItems()), self._going()
         self.compare_button.setEnabled(count == 2)
         self.delete_button.setEnabled(count > 0)
-        self.keep_button.setVisible(going is not None)
-        if going is not None:
-            self.keep_button.setText(f"Keep {short(title(going), NAME_CHARACTERS)} with the project")
+        # never hidden: the list would move from under the mouse between press and release
+        self.keep_button.setEnabled(going is not None)
+        name = "" if going is None else f" {short(title(going), NAME_CHARACTERS)}"
+        self.keep_button.setText(f"Keep{name} with the project")
 
     def _going(self) -> Render | None:
         """The one that is selected, where a person made it and it is kept nowhere."""

@@ -26,7 +26,9 @@ from render.scene.motion import LinearStage, NoMotion, Turntable
 from studio.editing.scene_edits import set_motion
 from studio.project.document import Document
 from studio.project.project import Project
+from studio.project.project_files import carry
 from studio.qt.core.boxes import ChoiceBox
+from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.folders import ask_results_folder, may_replace_scan, unused_name
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner
 from studio.qt.core.open_file import open_file
@@ -35,6 +37,7 @@ from studio.qt.core.session import Session
 from studio.qt.core.step_bar import StepBar
 from studio.qt.render.resuming import ask_resume, told_before_resuming
 from studio.runtime.console import FRAMES, frame_of
+from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job, Progress
 from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan_folder import frame_stem, open_folder
@@ -124,21 +127,33 @@ class MotionPanel(QWidget):
         """Ask for the folder of the results, then run the scan; while something is rendered, nothing is asked."""
         if self._is_busy():
             return  # the folder that a person chooses is made
-        place = self.session.place
+        session, place = self.session, self.session.place
         name = unused_name(place, f"{self.session.project.name} scan")
         # the size of a single render is another one
         size = f"{counted(self.session.project.scene.frame_count, 'frame')} at {self.scale.currentText()}"
         chosen = ask_results_folder(self, f"Folder for the scan's results: {size}", place, name)
         if chosen is None:
             return
+        session.chose(chosen)
         goes_on = is_unfinished(chosen, scaled(self.session.project, SCALES[self.scale.currentText()]))
         if goes_on or holds_scan(chosen) is None or may_replace_scan(self, chosen):
-            self.run_into(chosen)
+            try:
+                self.run_into(chosen)
+            except InputError as error:
+                show_trouble(self.window(), trouble(error, "run the scan"))
 
     def run_into(self, folder: Path, report: bool = True) -> Job[ScanResult] | None:
-        """Run the scan into a folder; None: something else is being rendered. What the folder holds of it is kept."""
+        """Run the scan into a folder; None: something else is being rendered. What the folder holds of it is kept.
+
+        The meshes of a project that was never saved are copied there, or nobody could open the results later.
+        InputError: they cannot be.
+        """
         session, scale = self.session, SCALES[self.scale.currentText()]
-        order = Order(session.document, session.project, session.document.root, folder, scale, report)
+        document, root = session.document, session.document.root
+        if document.files_may_go and not self._is_busy():
+            carry(session.project, root, folder)
+            root = folder
+        order = Order(document, session.project, root, folder, scale, report)
         return self._start(order, resume=is_unfinished(folder, scaled(order.project, scale)))
 
     def ask_and_resume(self) -> None:

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from PySide6.QtWidgets import QApplication
 
-from studio.project.input_files import input_files
-from studio.project.templates import FOLDER
 from studio.qt.core.render import Render
 from studio.qt.core.session import Session
 
@@ -46,13 +42,9 @@ def copy_as_python(session: Session, render: Render | None, said: str = "") -> N
         text = python_lines(work)
     QApplication.clipboard().setText(text)
     told = f"Copied {len(text.splitlines())} lines of Python{said}"
-    if document.path is None and input_files(session.project.scene, document.root) and not _is_template(document.root):
+    if document.files_may_go:
         session.message.emit(
             "warning", f"{told}. Its meshes and textures go with the window until it is saved: save it, then copy again"
         )
         return
     session.message.emit("info", told)
-
-
-def _is_template(root: Path) -> bool:
-    return root.parent == FOLDER

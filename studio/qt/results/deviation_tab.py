@@ -295,6 +295,7 @@ class DeviationTab(QWidget):
     def _choose(self) -> None:
         chosen, _ = QFileDialog.getOpenFileName(self.window(), "Nominal part", str(self.session.place), FILES)
         if chosen:
+            self.session.chose(Path(chosen))
             self.take_nominal(Path(chosen))
 
     def _ask(self) -> None:

@@ -166,7 +166,7 @@ class ExportActions(QObject):
         self._tell_wait(path)
         job = self.runner.run(LANE, f"export {path.name}", work, then, in_turn=True)
         self._jobs = [job, *(before for before in self._jobs if before in self.runner.jobs(LANE))]
-        self.preferences.change(folder=str(path.parent))
+        self.session.chose(path)
 
     def _tell_wait(self, path: Path) -> None:
         """At once, where it will take a while: the status bar shows the render, and not what is written beside it."""

@@ -304,6 +304,7 @@ class HeightMapTab(QWidget):
         if not chosen:
             return
         path = Path(chosen)
+        self.session.chose(path)
         if not path.suffix:
             path = path.with_name(path.name + (".tif" if "TIFF" in kind else ".png"))
         try:

@@ -35,12 +35,13 @@ class ProfilePlot(plots.PointedPlots):
         self._dots: list[Any] = []
         self._shown: dict[str, Series] = {}
         self.held = False
-        """The axes stay as they are, as ranges are being dragged in them."""
+        """The axes stay as they are, as ranges are being dragged in them; those of another section are others."""
         self.repaint_theme()
 
     def show_series(self, truth: Series | None, measured: dict[str, Series], section: ProfileSection) -> None:
         """measured: by method."""
-        if section != self.section:
+        another = section != self.section
+        if another:
             self.section = section
             self.plot.setLabel("left", f"{_height(section)} / mm")
         for item in self._dots:
@@ -56,7 +57,7 @@ class ProfilePlot(plots.PointedPlots):
             item.setData(series.across[here], series.distance[here])
             self.plot.addItem(item)
             self._dots.append(item)
-        if not self.held:
+        if another or not self.held:
             self._fit(truth)
         self.mark(None)
 

@@ -272,6 +272,7 @@ class SectionTab(QWidget):
         if not chosen:
             return
         path = Path(chosen)
+        self.session.chose(path)
         if path.suffix.lower() not in (".dxf", ".csv"):
             path = path.with_name(path.name + (".csv" if "csv" in kind else ".dxf"))
         try:

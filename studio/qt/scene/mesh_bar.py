@@ -205,11 +205,11 @@ def selected_mesh(session: Session) -> SceneObject | None:
 
 
 def replace_mesh(session: Session, parent: QWidget) -> None:
-    """Another file for the selected object, as a person picks it; told where none is selected."""
-    if selected_mesh(session) is None:
-        session.message.emit("error", "select an object of a mesh file; its mesh is what is replaced")
-        return
+    """A mesh for the selected object, of a file or not, as a person picks it; told where none is selected."""
     path = session.selection[:3]
+    if path[:2] != OBJECTS or len(path) < 3:
+        session.message.emit("error", "select an object first: the mesh takes the place of its shape")
+        return
     file = mesh_importer.choose_mesh(session, parent)
     if file is not None:
         take = partial(take_mesh, session, path)

@@ -57,6 +57,8 @@ running: set[ImportThread] = set()
 def choose_file(session: Session, parent: QWidget, title: str, kinds: str) -> Path | None:
     """A file by the desktop's dialog, or None."""
     name, _ = QFileDialog.getOpenFileName(parent, title, str(session.place), kinds)
+    if name:
+        session.chose(Path(name))
     return Path(name) if name else None
 
 
@@ -67,6 +69,8 @@ def choose_mesh(session: Session, parent: QWidget) -> Path | None:
 def choose_meshes(session: Session, parent: QWidget) -> None:
     """Import what a person picks in the desktop's dialog."""
     names, _ = QFileDialog.getOpenFileNames(parent, "Import meshes", str(session.place), MESH_FILES)
+    if names:
+        session.chose(Path(names[0]))
     import_meshes(session, [Path(name) for name in names], parent)
 
 

@@ -40,7 +40,7 @@ from studio.qt.core import theme
 from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.session import Session
 from studio.qt.scene import scene_actions
-from studio.qt.scene.mesh_bar import replace_mesh, selected_mesh
+from studio.qt.scene.mesh_bar import replace_mesh
 from studio.qt.scene.mesh_importer import import_meshes
 from studio.qt.scene.scene_icons import scene_icon
 from studio.qt.scene.scene_nodes import Node, nodes
@@ -301,7 +301,6 @@ class SceneTree(QTreeWidget):
             shown = value_at(session.project, path).visible
             alone = None if path in session.selections else path
             menu.addAction("Hide" if shown else "Show", lambda: scene_actions.toggle_visible(session, alone))
-        if selected_mesh(session) is not None:
             menu.addAction("Replace mesh…", lambda: replace_mesh(session, self))
         menu.addAction("Move up", lambda: scene_actions.move(session, -1)).setEnabled(path[-1] != 0)
         menu.addAction("Move down", lambda: scene_actions.move(session, 1)).setEnabled(path[-1] != siblings - 1)

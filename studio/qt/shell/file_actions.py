@@ -8,7 +8,6 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QDialog, QFileDialog, QMenu, QWidget
 
-from analysis.report.units import counted
 from render.base.errors import InputError
 from studio.editing.units import Unit
 from studio.project.autosave import Autosave, Recovery, find, find_of, sweep
@@ -28,7 +27,7 @@ from studio.qt.core.dialogs import (
 )
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
-from studio.qt.shell.going import Going
+from studio.qt.shell.going import Going, not_saved
 from studio.qt.shell.missing_files import may_open
 from studio.runtime.error_messages import trouble
 from studio.runtime.preferences import PreferencesFile, recovery_folder
@@ -170,6 +169,8 @@ class FileActions(QObject):
 
     def open_results_dialog(self) -> bool:
         name = QFileDialog.getExistingDirectory(self.window, "Open the results of a scan", str(self.session.place))
+        if name:
+            self.session.chose(Path(name))
         return bool(name) and self.open_results(Path(name))
 
     def open_results(self, folder: Path, ask: bool = True) -> bool:
@@ -322,9 +323,7 @@ class FileActions(QObject):
         self.preferences.add_recent(path)
         now = document.project.name
         called = "" if now == before else f"; the project is now called “{now}” after its file (it was “{before}”)"
-        going = sum(render.is_kept_nowhere for render in self.session.renders)
-        renders = f"; {counted(going, 'render')} of this session not kept with it: Keep, in Render" if going else ""
-        self.session.message.emit("info", f"Saved {path}{called}{renders}")
+        self.session.message.emit("info", f"Saved {path}{called}{not_saved(self.session)}")
         return True
 
     def _name_in(self, path: Path) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from analysis.report.units import percent
+from analysis.report.units import counted, percent
 from studio.qt.calibrate.calibration_work import CalibrationWork
 from studio.qt.core.jobs import RENDER, JobRunner, duration
 from studio.qt.core.session import Session
@@ -58,6 +58,17 @@ def what_goes(session: Session, runner: JobRunner, panels: Panels, *, quits: boo
     made = [one for one in session.renders if one.is_kept_nowhere]
     seconds = sum(sum(one.frame.seconds.values()) for one in made)
     return Going(told, len(made), seconds, _calibration(session) if quits else "")
+
+
+def not_saved(session: Session) -> str:
+    """For who saves the project: what of the session does not go into its file; empty: there is nothing."""
+    renders, told = sum(one.is_kept_nowhere for one in session.renders), ""
+    if renders:
+        told = f"; {counted(renders, 'render')} of this session not kept with it: Keep, in Render"
+    work = session.findChild(CalibrationWork)
+    if work is not None and work.solved is not None and work.solved is not work.kept:
+        told += "; the calibration is neither saved nor used in the project: see Calibrate"
+    return told
 
 
 def _calibration(session: Session) -> str:

@@ -86,7 +86,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.session = session
         self.preferences = preferences or PreferencesFile()
-        session.last_folder = lambda: self.preferences.values.folder
+        session.preferences = self.preferences
         self.workspace, self._settling = "", False
         self._called: set[str] = set()
         """Panels that no person put where they are."""

@@ -137,6 +137,7 @@ class StudyPanel(QWidget):
         name = f"{self.work.draft['name']} results"
         chosen = ask_results_folder(self, "Folder for the study's results", self.session.place, name)
         if chosen is not None:
+            self.session.chose(chosen)
             self.work.choose_folder(chosen)
         return chosen is not None
 
@@ -154,17 +155,20 @@ class StudyPanel(QWidget):
     def _open(self) -> None:
         chosen, _ = QFileDialog.getOpenFileName(self, "Open a study", str(self.session.place), FILES)
         if chosen:
+            self.session.chose(Path(chosen))
             self.work.load(Path(chosen))
 
     def _open_results(self) -> None:
         chosen = QFileDialog.getExistingDirectory(self, "Folder of a study's results", str(self.session.place))
         if chosen:
+            self.session.chose(Path(chosen))
             self.work.open_folder(Path(chosen))
 
     def _save(self) -> None:
         suggestion = str(self.session.place / f"{self.work.draft['name']}.json")
         chosen, _ = QFileDialog.getSaveFileName(self, "Save the study", suggestion, FILES)
         if chosen:
+            self.session.chose(Path(chosen))
             self.work.save(Path(chosen))
 
     def _add_sweep(self) -> None:

@@ -19,9 +19,10 @@ from studio.project.templates import template_folder
 def test_the_lens_is_told_with_why_it_was_chosen_and_which_was_the_best() -> None:
     trials = [LensTrial(0, 1.2, 43e-6, 2e-5), LensTrial(4, 1.1, 41e-6, 0.6), LensTrial(5, 1.09, 42e-6, 1.0)]
     assert lens_sentence(4, trials) == (
-        "4 distortion terms: no lens with more is proved better on views that were left out of its fit. Each lens with "
-        "the mean squared residual there, how far off its boards depth was, and the chance p that noise alone makes "
-        "one with more terms seem as good (proved: under 0.05): 0 terms 1.2, 43 um, p 2e-05; "
+        "4 distortion terms: the fewest to which no lens with more is proved better on views that were left out of its "
+        "fit. Each lens with the mean squared residual there, how far off its boards depth was, and p, the chance that "
+        "noise alone makes a lens with more terms seem so much better (below 0.05 more terms are proved to help): "
+        "0 terms 1.2, 43 um, p 2e-05; "
         "4 terms 1.1, 41 um, p 0.6 (chosen); 5 terms 1.09, 42 um (the least residual)"
     )
 

@@ -337,3 +337,19 @@ class TestInputFiles:
 def test_the_scale_is_named_where_the_whole_project_is_given(made: Path) -> None:
     with pytest.raises(InputError, match=rf"camera\.width.*--scale {SCALE}"):
         reconstruct(made, Project.load(made / "project" / "project.json"))
+
+
+@pytest.mark.parametrize("place", ["second", "second/scan"])
+def test_input_files_that_are_beside_the_scan_by_now_are_those_of_it(made: Path, place: str) -> None:
+    """A project that was saved after its scan, and carried its meshes along."""
+    scanned = made / "second" / "scan"
+    shutil.copytree(made / "out", scanned)
+    there = scan_folder.open_folder(made / "out")
+    for name in there.inputs:
+        (made / place / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(there.root / name, made / place / name)
+    assert there.inputs, "the project has a mesh"
+    assert scan_folder.open_folder(scanned).root == (made / place).resolve()
+    for name in there.inputs:
+        (made / place / name).write_bytes(b"another")
+    assert scan_folder.open_folder(scanned).root != (made / place).resolve(), "only with the hashes that they had"

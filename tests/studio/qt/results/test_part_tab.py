@@ -369,6 +369,15 @@ def test_the_axes_stay_while_a_measure_is_placed(panel: ResultsPanel, qtbot: QtB
     assert view.viewRange()[0] != pytest.approx([-10.0, 10.0])
 
 
+def test_another_section_is_brought_into_view_also_while_a_measure_is_placed(panel: ResultsPanel) -> None:
+    panel.part.start("step")
+    panel.session.set(("measured_in",), "upright", "section")
+    series = next(iter(panel.profile._shown.values()))
+    low, high = panel.profile.plot.vb.viewRange()[1]
+    there = series.distance[np.isfinite(series.distance)]
+    assert np.mean((there > low) & (there < high)) > 0.9
+
+
 def test_texts_that_come_and_go_leave_table_and_fields_where_they_are(panel: ResultsPanel, qtbot: QtBot) -> None:
     with_a_step(panel.session)
     panel.figures.setCurrentIndex(PART)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from render.base.pose import Pose
@@ -15,6 +16,7 @@ from render.scene.shape import MeshFile
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.qt.scene.inspector import Inspector
+from studio.qt.scene.mesh_bar import replace_mesh
 
 OBJECTS = ("scene", "objects")
 UNIT = (*OBJECTS, 1, "shape", "unit")
@@ -52,3 +54,27 @@ def test_in_too_large_a_unit_it_is_said_to_be_around_the_camera(
     session.document.undo()
     session.document.undo()
     qtbot.waitUntil(lambda: "inside" not in bar.told.text() and "2 x 2 x 2 mm" in bar.told.text())
+
+
+def test_a_file_takes_the_place_of_any_object_s_shape(
+    session: Session, inspector: Inspector, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    """A newcomer could not put a part in the place of the sample's."""
+    file = Path(session.document.root) / "block.stl"
+    trimesh.creation.box(extents=(40.0, 30.0, 20.0)).export(file)
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(file), ""))
+    session.select((*OBJECTS, 0))
+    before = session.project.scene.objects[0]
+    assert not isinstance(before.shape, MeshFile)
+    replace_mesh(session, inspector)
+    qtbot.waitUntil(lambda: isinstance(session.project.scene.objects[0].shape, MeshFile), timeout=10_000)
+    after = session.project.scene.objects[0]
+    assert (after.T_world_object, after.material) == (before.T_world_object, before.material)
+
+
+def test_where_no_object_is_selected_it_says_what_to_do(session: Session, inspector: Inspector) -> None:
+    told: list[str] = []
+    session.message.connect(lambda _, text: told.append(text))
+    session.select(())
+    replace_mesh(session, inspector)
+    assert told == ["select an object first: the mesh takes the place of its shape"]
