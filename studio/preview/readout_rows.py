@@ -200,7 +200,8 @@ def _saturation(r: Readouts) -> Row:
     help = (
         "Expected share of the scan lines whose brightest pixel exceeds the full well: shot and read noise decide it, "
         "and speckle where the sensor's is switched on. Beside it stands how full the brightest place of the line is, "
-        "as it is expected without noise. Shorten the exposure, or lower the power. "
+        "as it is expected without noise, and in focus where images do not have the lens's blur. Shorten the exposure, "
+        "or lower the power. "
         f"{NOT_REFLECTED}"
     )
     if r.saturated is None or r.peak_electrons is None:
@@ -208,6 +209,8 @@ def _saturation(r: Readouts) -> Row:
     level: Level = "error" if r.saturated > MUCH_SATURATED else "warning" if r.saturated > SATURATED else ""
     full = r.peak_electrons.high / r.full_well
     alone = " without speckle" if r.speckled else ""
+    if not r.blurs_images and r.blur_px is not None and r.blur_px.high > BLURRED_PX:
+        alone += ", as if in focus"
     return Row("saturated", "Saturated", f"{r.saturated:.0%}", f"up to {full:.0%} of full well{alone}", level, help)
 
 

@@ -20,7 +20,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from analysis.report.style import short
 from render.base.errors import InputError
 from studio.qt.core import theme
 from studio.qt.core.delete_key import DeleteKey
@@ -45,8 +44,6 @@ NEW_LINE = "\u2028"
 """Qt breaks an item's text only here."""
 NAMING = "A name keeps no settings: a render is developed as the project is then whenever it is shown."
 KEEPING = "Its light, its settings and its figures as they are read now are kept, whatever the project becomes."
-NAME_CHARACTERS = 16
-"""Of a name that a button has room for."""
 GOING = "Kept nowhere: it goes when the project is closed, saved or not."
 CLOSING = "Out of this session's renders; it stays kept with the project."
 
@@ -97,18 +94,18 @@ class History(QWidget):
         self.delete_button = QPushButton("Delete")
         self.table_button = QPushButton("Table")
         self.table_button.setToolTip("Figures and settings of all renders, and of those kept with the project")
-        self.keep_button = text_button("", f"{GOING}\n{KEEPING}")
+        self.keep_button = text_button("Keep", f"With the project. {GOING}\n{KEEPING}")
         self.broken = QLabel(wordWrap=True)
         self.broken.setObjectName("muted")
         top = QHBoxLayout()
         top.addWidget(heading, 1)
         top.addWidget(self.table_button)
         top.addWidget(self.compare_button)
+        top.addWidget(self.keep_button)
         top.addWidget(self.delete_button)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addLayout(top)
-        layout.addWidget(self.keep_button)  # above the list, whose end is out of sight on a small screen
         layout.addWidget(self.list, 1)
         layout.addWidget(self.broken)
         session.renders_changed.connect(self.refresh)
@@ -286,10 +283,7 @@ class History(QWidget):
         count, going = len(self.list.selectedItems()), self._going()
         self.compare_button.setEnabled(count == 2)
         self.delete_button.setEnabled(count > 0)
-        # never hidden: the list would move from under the mouse between press and release
         self.keep_button.setEnabled(going is not None)
-        name = "" if going is None else f" {short(title(going), NAME_CHARACTERS)}"
-        self.keep_button.setText(f"Keep{name} with the project")
 
     def _going(self) -> Render | None:
         """The one that is selected, where a person made it and it is kept nowhere."""

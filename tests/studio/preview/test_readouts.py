@@ -171,6 +171,8 @@ def test_depth_noise_says_where_it_takes_the_line_to_be_sharp_and_unsaturated() 
         found = next(row for row in rows(read(project, "plane")) if row.key == "sigma")
         assert (found.note.startswith(told) and found.level == "warning") if told else "as if" not in found.note
         assert (found.value == NOTHING) == (project is exposed), "more light would make it look better"
+        full = next(row for row in rows(read(project, "plane")) if row.key == "saturated").note
+        assert full.endswith(", as if in focus") == (project is blurred), "a lens that blurs fills no pixel like this"
     some = replace(read(sample("plane"), "plane"), saturated=0.3)
     assert next(row for row in rows(some) if row.key == "sigma").note.startswith("as if unsaturated, with speckle ")
 
