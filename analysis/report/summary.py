@@ -88,10 +88,11 @@ def tiles(found: Total) -> list[tuple[str, str, str]]:
             ("Depth bias", micrometres(depth.bias, 2), "+ is too far"),
             ("Depth sigma", micrometres(depth.sigma), f"robust {micrometres(depth.robust_sigma)}{of_sample}"),
         ]
+    of_lines = f"{count(found.measured_rows)} of {count(found.truth_rows)} scan lines"
     return [
         *spread,
         ("Off the surface", micrometres(found.surface.p95), f"95 % are nearer{of_sample}"),
-        ("Complete", percent(found.completeness), f"{count(found.points)} points"),
+        ("Complete", percent(found.completeness), of_lines),
     ]
 
 

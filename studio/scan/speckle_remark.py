@@ -46,8 +46,8 @@ def speckle_remark(project: Project, measured: Sequence[Measured], of: str = "")
         if sigma > robust:
             which = f" of {project.scene.lasers[i].name}" if len(measured) > 1 else ""
             return (
-                f"Laser speckle is switched off in the sensor: the errors{which} (robust sigma{of} "
-                f"{micrometres(robust)}) have none of it, where a laser on a rough surface scatters depth by about "
+                f"Laser speckle is switched off in the sensor: the errors{which} (robust sigma "
+                f"{micrometres(robust)}{of}) have none of it, where a laser on a rough surface scatters depth by about "
                 f"{micrometres(sigma)}. "
                 "Switch it on (sensor, Laser speckle) for what a real scanner of this kind meets."
             )

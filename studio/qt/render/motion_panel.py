@@ -40,7 +40,7 @@ from studio.runtime.console import FRAMES, frame_of
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job, Progress
 from studio.scan.options import Listener, ScanOptions
-from studio.scan.scan_folder import frame_stem, open_folder
+from studio.scan.scan_folder import MANIFEST, frame_stem, open_folder
 from studio.scan.scan_results import holds_scan, is_unfinished
 from studio.scan.stages import scaled
 
@@ -258,6 +258,8 @@ class MotionPanel(QWidget):
             self.go_on.show()
             self.stopped_changed.emit()
             told = f"The scan was stopped; Render > Resume the scan goes on at {size_of(order)}: {order.folder}"
+            if (order.folder / MANIFEST).is_file():
+                told = f"All is measured, the report is not written; Render > Resume the scan writes it: {order.folder}"
             self.session.message.emit("info", told)
 
     def _tell_scan(self) -> None:

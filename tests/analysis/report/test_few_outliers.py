@@ -104,3 +104,10 @@ def test_a_calibration_of_another_set_up_is_no_part_of_the_mean_error() -> None:
     said = " ".join(remarks(dataclasses.replace(found, depth_z=off, calibration=80e-6))).replace("\u00a0", " ")
     assert "a calibration that does not hold here" in said and "562 times what it tells of itself (80.0 µm" in said
     assert "common to all of them" not in said
+
+
+def test_completeness_is_told_with_the_scan_lines_that_it_is_the_share_of() -> None:
+    """99.8 % stood over 8,187 points of 8,192 scan lines, which is 99.9 %: outliers count as points."""
+    found = total(with_outliers(2, 20.0).record.chosen())
+    name, share, note = tiles(found)[-1]
+    assert (name, share) == ("Complete", "99.8\u00a0%") and note == "1\u202f198 of 1\u202f200 scan lines"
