@@ -32,9 +32,10 @@ KNOWN_NUMBA = "0.68."
 """Versions of numba whose inside `kernel_dispatcher` was made for, and is tested with."""
 CALLEE = ".callee"
 """End of the names of files that hold what kernels call, which go as soon as all kernels are there."""
-MARKS = b"njit", b"peak_kernel", b"intrinsic"
 IMPORT = re.compile(rb"^from ((?:render|analysis)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
-KERNEL = re.compile(rb"^[ \t]*@(?:(?:numba\.)?njit|peak_kernel|intrinsic)\b", re.MULTILINE)
+MARKS = b"njit", b"peak_kernel", b"intrinsic"
+"""Decorators of what is compiled."""
+KERNEL = re.compile(rb"^[ \t]*@(?:numba\.)?(?:%s)\b" % b"|".join(MARKS), re.MULTILINE)
 CONSTANT = re.compile(rb"\b(?:[A-Z][A-Z0-9_]+|Flag)\b")
 _handing_over: list[bool] = []
 

@@ -209,7 +209,7 @@ def _saturation(r: Readouts) -> Row:
     level: Level = "error" if r.saturated > MUCH_SATURATED else "warning" if r.saturated > SATURATED else ""
     full = r.peak_electrons.high / r.full_well
     alone = " without speckle" if r.speckled else ""
-    if not r.blurs_images and r.blur_px is not None and r.blur_px.high > BLURRED_PX:
+    if _is_out_of_focus(r):
         alone += ", as if in focus"
     return Row("saturated", "Saturated", f"{r.saturated:.0%}", f"up to {full:.0%} of full well{alone}", level, help)
 
@@ -288,10 +288,15 @@ def _calibration(r: Readouts) -> list[Row]:
     return [Row("calibration", "Calibration", f"{off} µm off", "of another set-up", "error", help)]
 
 
+def _is_out_of_focus(r: Readouts) -> bool:
+    """The lens is, and images do not show it."""
+    return r.blur_px is not None and r.blur_px.high > BLURRED_PX and not r.blurs_images
+
+
 def _supposed(r: Readouts) -> tuple[str, Level]:
     """What the depth's noise takes the line to be, and it is not."""
     wrong = []
-    if r.blur_px is not None and r.blur_px.high > BLURRED_PX and not r.blurs_images:
+    if _is_out_of_focus(r):
         wrong.append("in focus")
     if r.spreads:
         wrong.append("opaque")

@@ -180,6 +180,14 @@ def beside_project(session: Session, name: str) -> str:
     return str(session.place / f"{session.project.name} {name}".replace("/", "-"))
 
 
+def choose_file(session: Session, parent: QWidget, title: str, kinds: str) -> Path | None:
+    """A file by the desktop's dialog, or None."""
+    name, _ = QFileDialog.getOpenFileName(parent, title, str(session.place), kinds)
+    if name:
+        session.chose(Path(name))
+    return Path(name) if name else None
+
+
 def export_csv(parent: QWidget, session: Session, name: str, what: str, write: Callable[[Path], None]) -> None:
     """Ask where, the project's `name` being proposed, and write there; what: cannot be done, if it cannot."""
     chosen, _ = QFileDialog.getSaveFileName(

@@ -128,14 +128,14 @@ class MotionPanel(QWidget):
         if self._is_busy():
             return  # the folder that a person chooses is made
         session, place = self.session, self.session.place
-        name = unused_name(place, f"{self.session.project.name} scan")
+        name = unused_name(place, f"{session.project.name} scan")
         # the size of a single render is another one
-        size = f"{counted(self.session.project.scene.frame_count, 'frame')} at {self.scale.currentText()}"
+        size = f"{counted(session.project.scene.frame_count, 'frame')} at {self.scale.currentText()}"
         chosen = ask_results_folder(self, f"Folder for the scan's results: {size}", place, name)
         if chosen is None:
             return
         session.chose(chosen)
-        goes_on = is_unfinished(chosen, scaled(self.session.project, SCALES[self.scale.currentText()]))
+        goes_on = is_unfinished(chosen, scaled(session.project, SCALES[self.scale.currentText()]))
         if goes_on or holds_scan(chosen) is None or may_replace_scan(self, chosen):
             try:
                 self.run_into(chosen)
@@ -148,9 +148,11 @@ class MotionPanel(QWidget):
         The meshes of a project that was never saved are copied there, or nobody could open the results later.
         InputError: they cannot be.
         """
+        if self._is_busy():
+            return None
         session, scale = self.session, SCALES[self.scale.currentText()]
         document, root = session.document, session.document.root
-        if document.files_may_go and not self._is_busy():
+        if document.files_may_go:
             carry(session.project, root, folder)
             root = folder
         order = Order(document, session.project, root, folder, scale, report)
@@ -257,10 +259,11 @@ class MotionPanel(QWidget):
             self._tell_scan()
             self.go_on.show()
             self.stopped_changed.emit()
-            told = f"The scan was stopped; Render > Resume the scan goes on at {size_of(order)}: {order.folder}"
             if (order.folder / MANIFEST).is_file():
-                told = f"All is measured, the report is not written; Render > Resume the scan writes it: {order.folder}"
-            self.session.message.emit("info", told)
+                told = "All is measured, the report is not written; Render > Resume the scan writes it"
+            else:
+                told = f"The scan was stopped; Render > Resume the scan goes on at {size_of(order)}"
+            self.session.message.emit("info", f"{told}: {order.folder}")
 
     def _tell_scan(self) -> None:
         """In what the project is another by now than the scan that was stopped, or that is under way."""

@@ -11,7 +11,6 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QHideEvent, QImage, QPixmap, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
-    QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QLabel,
@@ -28,7 +27,7 @@ from studio.commands.deviation import asked, details, sentence
 from studio.editing.units import Unit as ShownUnit
 from studio.project.step_file import is_step
 from studio.qt.core.boxes import ChoiceBox
-from studio.qt.core.dialogs import export_csv, show_trouble
+from studio.qt.core.dialogs import choose_file, export_csv, show_trouble
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, ShownDeviation
 from studio.qt.core.widgets import ElidedLabel, text_button
@@ -293,10 +292,9 @@ class DeviationTab(QWidget):
             self.told.setText(job.problem.text)
 
     def _choose(self) -> None:
-        chosen, _ = QFileDialog.getOpenFileName(self.window(), "Nominal part", str(self.session.place), FILES)
-        if chosen:
-            self.session.chose(Path(chosen))
-            self.take_nominal(Path(chosen))
+        chosen = choose_file(self.session, self.window(), "Nominal part", FILES)
+        if chosen is not None:
+            self.take_nominal(chosen)
 
     def _ask(self) -> None:
         export_csv(self.window(), self.session, "deviation", "the deviation", self.write)

@@ -16,6 +16,7 @@ from studio.project.document import FieldPath, value_at
 from studio.project.mesh_import import copied_beside
 from studio.project.project import Project
 from studio.qt.core import theme
+from studio.qt.core.dialogs import choose_file
 from studio.qt.core.session import Session
 from studio.qt.forms.fields import tool_button
 from studio.qt.forms.form import Form
@@ -154,7 +155,7 @@ class Inspector(QWidget):
             if file is not None:
                 mesh_importer.import_meshes(self.session, [file], self, partial(take_mesh, self.session, path[:3]))
             return
-        file = mesh_importer.choose_file(self.session, self, "Image", IMAGE_FILES)
+        file = choose_file(self.session, self, "Image", IMAGE_FILES)
         if file is None or not mesh_importer.may_copy(self, [file], root):
             return
         try:

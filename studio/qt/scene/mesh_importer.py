@@ -14,7 +14,7 @@ from studio.editing.scene_edits import add_mesh, add_parts
 from studio.preview.readouts import facet_chord, readouts
 from studio.project.mesh_import import ImportedMesh, folder_of_parts, import_mesh, import_step, needs_copy
 from studio.project.step_file import LARGEST_CHORD, LEAST_CHORD, is_step
-from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.dialogs import choose_file, show_trouble
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.runtime.error_messages import trouble
@@ -52,14 +52,6 @@ class ImportThread(QThread):
 
 running: set[ImportThread] = set()
 """Imports under way."""
-
-
-def choose_file(session: Session, parent: QWidget, title: str, kinds: str) -> Path | None:
-    """A file by the desktop's dialog, or None."""
-    name, _ = QFileDialog.getOpenFileName(parent, title, str(session.place), kinds)
-    if name:
-        session.chose(Path(name))
-    return Path(name) if name else None
 
 
 def choose_mesh(session: Session, parent: QWidget) -> Path | None:

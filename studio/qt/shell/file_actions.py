@@ -169,9 +169,10 @@ class FileActions(QObject):
 
     def open_results_dialog(self) -> bool:
         name = QFileDialog.getExistingDirectory(self.window, "Open the results of a scan", str(self.session.place))
-        if name:
-            self.session.chose(Path(name))
-        return bool(name) and self.open_results(Path(name))
+        if not name:
+            return False
+        self.session.chose(Path(name))
+        return self.open_results(Path(name))
 
     def open_results(self, folder: Path, ask: bool = True) -> bool:
         """Look at a finished scan, with its own project where the open one is another."""

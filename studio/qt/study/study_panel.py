@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from studio.qt.core.boxes import ChoiceBox, DecimalBox, WholeBox
+from studio.qt.core.dialogs import choose_file
 from studio.qt.core.folders import ask_results_folder
 from studio.qt.core.icons import icon_button
 from studio.qt.core.jobs import JobRunner, duration
@@ -153,10 +154,9 @@ class StudyPanel(QWidget):
         menu.addAction("Save the study…", self._save)
 
     def _open(self) -> None:
-        chosen, _ = QFileDialog.getOpenFileName(self, "Open a study", str(self.session.place), FILES)
-        if chosen:
-            self.session.chose(Path(chosen))
-            self.work.load(Path(chosen))
+        chosen = choose_file(self.session, self, "Open a study", FILES)
+        if chosen is not None:
+            self.work.load(chosen)
 
     def _open_results(self) -> None:
         chosen = QFileDialog.getExistingDirectory(self, "Folder of a study's results", str(self.session.place))

@@ -148,3 +148,13 @@ def test_an_image_of_which_nothing_is_known_is_given_no_figure():
     one = GroupQuality("indirect", "red", 0.08, 0.1, 2e6, "light paths", of="line", image_target=0.1)
     assert "image error 42% (not needed; 10% would end it too)" in quality_text(replace(one, image_error=0.42))
     assert "image error over 100% (not needed" in quality_text(replace(one, image_error=8.99))
+
+
+def test_light_that_was_spread_is_told_with_its_share() -> None:
+    one = GroupQuality("indirect", "red", 0.01, 0.07, 4e3, "light paths", of="line", share=0.0182)
+    assert quality_text(one).endswith("1.82% of the direct light")
+    assert quality_text(replace(one, spread=0.0)) == quality_text(one)
+    assert (
+        quality_text(replace(one, spread=0.15))
+        == f"{quality_text(one)}, 15% of it spread, as one path alone made a peak"
+    )

@@ -51,7 +51,7 @@ def test_its_results_are_opened_when_the_window_has_gone(
     found = open_folder(tmp_path / "scan")
     assert (found.root / MESH).is_file() and found.root == (tmp_path / "scan").resolve()
     assert window.files.open_results(tmp_path / "scan", ask=False)
-    assert window.session.shown is None or window.session.shown.scan is not None
+    qtbot.waitUntil(lambda: window.session.shown is not None and window.session.shown.scan is not None)
 
 
 def test_another_mesh_in_the_way_is_named_and_nothing_runs(window: MainWindow, draft: Path, tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from studio.qt.core.session import Session
 from studio.qt.scene import mesh_importer
 from studio.qt.scene.inspector import Inspector
 from tests.studio.qt.scene.inspector_hands import CAMERA, LASER, field, type_into
+from tests.studio.qt.shell.window_hands import choose_file
 
 
 def tools(inspector: Inspector) -> list[QToolButton]:
@@ -101,7 +102,7 @@ class TestKinds:
         outside = tmp_path.parent / f"{tmp_path.name}-outside" / "part.stl"
         outside.parent.mkdir()
         trimesh.creation.box((100, 50, 20)).export(outside)
-        monkeypatch.setattr(mesh_importer, "choose_file", lambda *_: outside)
+        choose_file(monkeypatch, outside)
         monkeypatch.setattr(mesh_importer, "may_copy", lambda *_: True)
         session.select(("scene", "objects", 1))
         self.choose(qtbot, inspector, ("scene", "objects", 1, "shape"), "Mesh file")
@@ -147,7 +148,7 @@ class TestKinds:
         assert session.project.scene.objects[1] == placed
         qtbot.waitUntil(lambda: bar.ground.isEnabled())
         trimesh.creation.icosphere(1, 10.0).export(outside.with_name("ball.stl"))
-        monkeypatch.setattr(mesh_importer, "choose_file", lambda *_: outside.with_name("ball.stl"))
+        choose_file(monkeypatch, outside.with_name("ball.stl"))
         qtbot.mouseClick(bar.replace, Qt.MouseButton.LeftButton)
         qtbot.waitUntil(lambda: session.project.scene.objects[1].shape.path == "meshes/ball.stl")
         qtbot.waitUntil(lambda: not mesh_importer.running)
@@ -177,7 +178,7 @@ class TestKinds:
         self, qtbot: QtBot, session: Session, inspector: Inspector, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         before = session.project
-        monkeypatch.setattr(mesh_importer, "choose_file", lambda *_: None)
+        choose_file(monkeypatch, "")
         session.select(("scene", "objects", 1))
         for part, label in (("shape", "Mesh file"), ("material", None)):
             path = ("scene", "objects", 1, part)
@@ -191,7 +192,7 @@ class TestKinds:
         self, qtbot: QtBot, session: Session, inspector: Inspector, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         (tmp_path / "wood.png").write_bytes(b"png")
-        monkeypatch.setattr(mesh_importer, "choose_file", lambda *_: tmp_path / "wood.png")
+        choose_file(monkeypatch, tmp_path / "wood.png")
         session.select(("scene", "objects", 1))
         self.choose(qtbot, inspector, ("scene", "objects", 1, "material", "albedo"), "Image")
         assert session.project.scene.objects[1].material.albedo == Texture(path="wood.png")
