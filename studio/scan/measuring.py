@@ -139,17 +139,17 @@ class Measuring:
         out: Path,
         world: World,
         *,
-        root: Path,
+        logo_folder: Path,
         notes: Sequence[str],
         created: str | None = None,
         image_scale: float = 1.0,
         run: str = "",
     ) -> list[Path]:
-        """report.html and report.pdf; `world` is that of step 0, `run` as of `run_text`, root: the project's folder."""
+        """report.html and report.pdf; `world` is that of step 0, `run` as of `run_text`."""
         from analysis.report.write import write_report
 
         data = report_input(
-            self._project.in_folder(root),
+            self._project.in_folder(logo_folder),
             world,
             self.record,
             self._clock.seconds,

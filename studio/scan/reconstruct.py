@@ -38,16 +38,19 @@ def reconstruct_folder(
     *,
     report: bool,
     threads: int | None = None,
+    logo_folder: Path | None = None,
 ) -> dict[str, Any]:
     """Develop, extract and triangulate the frames of a scan anew; `project` may have another sensor or extraction.
 
-    Writes points and, where requested, the report into `out`. InputError: frames missing or damaged, `project` differs
+    Writes points and, where requested, the report into `out`. logo_folder: where the report's logo is looked for, if
+    not where the meshes are. InputError: frames missing or damaged, `project` differs
     in what the frames fix, or as `scan_folder.measuring`.
     """
     scan_folder.check_kept(found)
     scan_folder.check_measures(found, project)
     with scan_folder.measuring(found, root, out):
-        return _measured(found, project, root, out, clock, report=report, threads=threads)
+        logos = root if logo_folder is None else logo_folder
+        return _measured(found, project, root, out, clock, report=report, threads=threads, logo_folder=logos)
 
 
 def _measured(
@@ -59,6 +62,7 @@ def _measured(
     *,
     report: bool,
     threads: int | None,
+    logo_folder: Path,
 ) -> dict[str, Any]:
     how = development(found.project, requested)
     project = how.project
@@ -97,7 +101,7 @@ def _measured(
             measured["measures"] = measures_record(project.measures, measuring.record.readings)
             measured["measures_note"] = section_note(project)
             measured |= {"results": figures, "extraction": measuring.notes(), "notes": notes}
-            measured["remarks"] = [*measuring.remarks(), *logo_remarks(project, root)]
+            measured["remarks"] = [*measuring.remarks(), *logo_remarks(project, logo_folder)]
             if any(getattr(requested, name) != getattr(found.project, name) for name in scan_folder.MEASURED_WITH):
                 measured["measured_with"] = requested.model_dump(mode="json", include=set(scan_folder.MEASURED_WITH))
             if report:
@@ -105,7 +109,7 @@ def _measured(
                 # another laser power scales the frames' light, which a render with that power repeats but for rounding
                 run = _run_text(found, how, measuring.record) if how.powered.scene == project.scene else ""
                 reports = measuring.write_reports(
-                    out, first, root=root, notes=notes, created=created, image_scale=image_scale, run=run
+                    out, first, logo_folder=logo_folder, notes=notes, created=created, image_scale=image_scale, run=run
                 )
                 measured["report"] = [path.name for path in reports]
                 files += reports

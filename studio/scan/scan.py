@@ -169,7 +169,7 @@ def run_scan(
             reports = measuring.write_reports(
                 out,
                 first,
-                root=root,
+                logo_folder=root,
                 notes=result["notes"],
                 created=result["created"],
                 image_scale=image_scale,

@@ -31,22 +31,27 @@ def export_scan_points(scan: ScanResults, path: Path, _: object = None) -> list[
     return [path]
 
 
-def export_scan_report(scan: ScanResults, project: Project, clock: Clock, path: Path, _: object = None) -> list[Path]:
-    """One .html or .pdf of all steps, measured as a project at the scan's image scale asks; the folder stays as it is.
+def export_scan_report(
+    scan: ScanResults, project: Project, logo_folder: Path, clock: Clock, path: Path, _: object = None
+) -> list[Path]:
+    """One .html or .pdf of all steps, measured as a project at the scan's image scale asks; the scan's own stays.
 
     InputError: as `reconstruct_folder`.
     """
     with tempfile.TemporaryDirectory() as folder:
-        reconstruct_folder(scan.found, project, scan.found.root, Path(folder), clock, report=True)
+        reconstruct_folder(
+            scan.found, project, scan.found.root, Path(folder), clock, report=True, logo_folder=logo_folder
+        )
         with atomic_write(path) as temporary:
             shutil.copyfile(Path(folder) / f"report{path.suffix.lower()}", temporary)
     return [path]
 
 
-def measure_scan_again(scan: ScanResults, project: Project, clock: Clock) -> None:
+def measure_scan_again(scan: ScanResults, project: Project, logo_folder: Path, clock: Clock) -> None:
     """Points, measures and report in its folder by a project at the scan's image scale; the frames stay.
 
     InputError: as `reconstruct_folder`.
     """
     found = open_folder(scan.found.folder)  # it may have been measured since it was opened
-    reconstruct_folder(found, project, found.root, found.folder, clock, report=scan.report is not None)
+    report = scan.report is not None
+    reconstruct_folder(found, project, found.root, found.folder, clock, report=report, logo_folder=logo_folder)

@@ -79,7 +79,7 @@ def main() -> int:
         done.write_points(Path(name))
         row = summarise(done.record)[0]
         print(f"{row['points']} points, {row['sampled_scan_lines']} of {row['scan_lines']} scan lines in the sample")
-        done.write_reports(Path(name), world, notes=())
+        done.write_reports(Path(name), world, logo_folder=Path(name), notes=())
         print(f"after points and report: {memory():.0f} MB, {time.perf_counter() - began:.0f} s")
         if len(sys.argv) > 2:
             for path in Path(name).glob("report.*"):

@@ -140,7 +140,7 @@ class ExportActions(QObject):
             progress("", 0.0)  # how far it is, nobody knows, and the job's name has the file's
             writer = writers[kind]
             if whole is not None:
-                writer = _of_all_steps(kind, whole, how.powered, Clock(progress, cancelled))
+                writer = _of_all_steps(kind, whole, how.powered, shown.root, Clock(progress, cancelled))
             as_shown = whole is not None or current or kind in ("frame", "height map", "film")
             what = shown if as_shown else _measured(shown, how, noise, cancelled)
             if kind == "height map":  # nobody was asked about the file beside the picture
@@ -221,12 +221,12 @@ def _is_there(what: str, render: Render) -> bool:
     return what == "frame" or bool(render.images if what == "image" else render.measurements)
 
 
-def _of_all_steps(kind: str, scan: ScanResults, project: Project, clock: Clock) -> Writer:
+def _of_all_steps(kind: str, scan: ScanResults, project: Project, root: Path, clock: Clock) -> Writer:
     from studio.scan import whole_scan
 
     if kind == "points":
         return partial(whole_scan.export_scan_points, scan)
-    return partial(whole_scan.export_scan_report, scan, project, clock)
+    return partial(whole_scan.export_scan_report, scan, project, root, clock)
 
 
 def _measured(shown: Exported, how: Development, noise: bool, cancelled: Cancel) -> Exported:

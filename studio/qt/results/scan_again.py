@@ -41,11 +41,12 @@ class ScanAgain(QObject):
             return
         now = render.developed_by(session.project)
         how, folder = development(render.project, now, render.image_scale), scan.found.folder
+        root = document.root  # as it is now: the delivery is the project's of now as well
 
         def work(progress: Progress, cancelled: Cancel) -> None:
             from studio.scan.whole_scan import measure_scan_again  # takes a while: not before a scan
 
-            measure_scan_again(scan, how.powered, Clock(progress, cancelled))
+            measure_scan_again(scan, how.powered, root, Clock(progress, cancelled))
 
         def then(_: None) -> None:
             scan_steps(session).measured[folder] = how.powered

@@ -9,6 +9,7 @@ from html import unescape
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from PySide6.QtWidgets import QMainWindow
 from pytestqt.qtbot import QtBot
 
@@ -103,6 +104,22 @@ def test_a_report_is_of_all_steps_with_the_measures_of_now(
     bench.bar.scope.setCurrentIndex(1)
     text = unescape(bench.write("export_html", tmp_path / "one.html", qtbot).read_text())
     assert "This is step 1 of 3 in scan alone." in text
+
+
+def test_the_logo_lies_beside_the_project_of_now_and_not_where_the_scan_was_run(
+    scanned: tuple[Path, Path], tmp_path: Path, qtbot: QtBot, quick_reports: None
+) -> None:
+    """A template that was scanned has its meshes in the program's own folder, and is saved elsewhere later."""
+    file = tmp_path / "saved" / "steps.json"
+    shutil.copytree(scanned[0].parent, file.parent)
+    Image.new("RGB", (8, 4), "teal").save(file.parent / "logo.png")
+    bench = Bench((file, scanned[1]), tmp_path, qtbot)
+    bench.session.set(("delivery", "logo"), "logo.png")
+    assert 'alt="Logo"' in bench.write("export_html", tmp_path / "all.html", qtbot).read_text()
+    bench.bar.scope.setCurrentIndex(1)
+    assert 'alt="Logo"' in bench.write("export_html", tmp_path / "one.html", qtbot).read_text()
+    assert not [text for _, text in bench.told if "The logo" in text]
+    bench.close()
 
 
 def test_a_scan_is_measured_again_with_the_measures_of_now(
