@@ -113,11 +113,11 @@ def _extract_group(
         line = extract_series(group, prepared.times, look, prepared.volume, threads)
         table = table_path(group[0], out, taken)
         write_line(table, line)
-        return summary(group[0], line, table)
+        return summary(group[0], line, table, look.region)
     measured = extract_photograph(group[0], look, threads, prepared.volume)
     table = table_path(group[0], out, taken)
     write_line(table, measured.line)
-    row = summary(group[0], measured.line, table)
+    row = summary(group[0], measured.line, table, look.region)
     if options.overlay:
         row["overlay"] = str(write_overlay(table.with_suffix(".png"), measured))
     return row

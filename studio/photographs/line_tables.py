@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.line.result import Flag, Line
 from render.base.csv_file import write_csv
+from studio.photographs.region import Region
 from studio.scan.own_files import check_replaceable, line_columns
 
 
@@ -28,8 +29,8 @@ def write_line(path: Path, line: Line) -> None:
     write_csv(path, line_columns(line.axis), rows)
 
 
-def summary(path: Path, line: Line, table: Path) -> dict[str, Any]:
-    """What a person or a program wants to know of one image."""
+def summary(path: Path, line: Line, table: Path, region: Region) -> dict[str, Any]:
+    """What a person or a program wants to know of one image; scan lines beyond the region do not count."""
     found = line.valid[:, 0]
 
     def typical(values: NDArray[np.float64]) -> float | None:
@@ -42,7 +43,7 @@ def summary(path: Path, line: Line, table: Path) -> dict[str, Any]:
         "method": line.method,
         "note": line.note,
         "axis": line.axis,
-        "scan_lines": len(found),
+        "scan_lines": region.scan_lines(len(found), line.axis),
         "found": int(found.sum()),
         "sigma_u_px": typical(line.sigma_u),
         "correlation_length_rows": None if line.correlation_length is None else typical(line.correlation_length),

@@ -28,11 +28,12 @@ class MeasuredSet:
             return self.problems.get(path, "not measured")
         line = self.lines[path].line
         found = line.valid[:, 0]
+        count = self.look.region.scan_lines(len(found), line.axis)
         if not found.any():
-            return f"no line found on {len(found)} {line.axis}; {line.note}"
+            return f"no line found on {count} {line.axis}; {line.note}"
         sigma = float(np.nanmedian(line.sigma_u[found, 0]))
         width = float(np.median(line.width[found, 0]))
-        told = f"{found.sum()} of {len(found)} {line.axis}, sigma {sigma:.3f} px, width {width:.2f} px"
+        told = f"{found.sum()} of {count} {line.axis}, sigma {sigma:.3f} px, width {width:.2f} px"
         return f"{told}; {line.note}" if line.note else told
 
 

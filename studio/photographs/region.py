@@ -54,6 +54,10 @@ class Region:
             )
         return image[y : y + h, x : x + w]
 
+    def scan_lines(self, count: int, axis: str) -> int:
+        """How many of an image's rows or columns are in its rectangle."""
+        return count if self.box is None else self.box[3 if axis == "rows" else 2]
+
     @property
     def closed(self) -> NDArray[np.bool_] | None:
         """(h, w) of the part: what the mask leaves out."""

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QListWidget,
+    QScrollArea,
     QSplitter,
     QVBoxLayout,
     QWidget,
@@ -39,6 +40,7 @@ from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import ShareBar, text_button
 from studio.qt.image.image_item import PictureView
+from studio.qt.image.zooms import Zooms
 from studio.runtime.jobs import Job, Progress
 from studio.scan.frame_views import picture, views
 
@@ -47,6 +49,7 @@ EMPTY = "Drop photographs of the line here, several of one set, or add them."
 FILTER = "Images ({});;All files (*)"
 CHOICES = {"colour": ("auto", "mono", "red", "green", "blue"), "axis": ("auto", "rows", "columns")}
 AUTO = "auto"
+OLD = "Settings have changed since: Measure, and the figures are of them."
 NO_RENDER = "Nothing is rendered yet: Render (F5), and the image appears here"
 NOT_CHOSEN = "No render is chosen: choose one in the list of the Render workspace"
 NOT_DEVELOPED = "The render is being developed; its image appears here"
@@ -66,7 +69,10 @@ class PhotographWindow(QWidget):
         self.paths: list[Path] = []
         self.offs: list[Path] = []
         self.found: MeasuredSet | None = None
-        self._fitted = False
+        self._asked_for: tuple[list[Path], Wishes] | None = None
+        """Of what is measured, or was last."""
+        self._fitted = 0, 0
+        """px, size of the photograph that was fitted into its view last."""
         self.names = QListWidget()
         self.colour, self.axis = ChoiceBox(), ChoiceBox()
         self.colour.addItems(CHOICES["colour"])
@@ -81,13 +87,17 @@ class PhotographWindow(QWidget):
         self.limited.setToolTip("Drag the rectangle and its corners in the photograph")
         self.measure_button = text_button("Measure", "The line in all photographs of the set", "primary")
         self.bar = ShareBar()
-        self.told, self.chosen, self.problem = QLabel(EMPTY), QLabel(), QLabel()
-        for label in (self.told, self.chosen, self.problem):
+        self.old, self.told, self.chosen, self.problem = QLabel(OLD), QLabel(EMPTY), QLabel(), QLabel()
+        self.old.setObjectName("warning")
+        for label in (self.old, self.told, self.chosen, self.problem):
             label.setWordWrap(True)
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.problem.setObjectName("error")
         self.chosen.setObjectName("muted")
         self.view, self.rendered = PictureView(), PictureView()
+        self.bright = QCheckBox("Brighten")
+        self.bright.setToolTip("Square root of the light, to see what is faint; photographs come so")
+        self.bright.setChecked(True)
         self.no_render = QLabel(NO_RENDER)
         self.no_render.setObjectName("muted")
         self.sure, self.doubtful = (pg.ScatterPlotItem(size=3, pen=None) for _ in range(2))
@@ -115,7 +125,7 @@ class PhotographWindow(QWidget):
     def clear(self) -> None:
         """Without photographs, laser-off images and results."""
         self.runner.cancel(LANE)
-        self.paths, self.offs, self.found, self._fitted = [], [], None, False
+        self.paths, self.offs, self.found, self._asked_for, self._fitted = [], [], None, None, (0, 0)
         self.names.clear()
         self.view.item.set_levels([])
         self.limited.setChecked(False)
@@ -145,6 +155,8 @@ class PhotographWindow(QWidget):
         except InputError as error:
             self.problem.setText(str(error))
             return
+        self._asked_for = paths, wishes
+        self._show_age()
 
         def work(progress: Progress, cancelled: Cancel) -> MeasuredSet | None:
             def go_on(share: float) -> bool:
@@ -209,19 +221,36 @@ class PhotographWindow(QWidget):
         left.addLayout(buttons)
         left.addWidget(self.names, 1)
         left.addLayout(form)
-        for widget in (self.limited, self.measure_button, self.bar, self.told, self.chosen, self.problem):
+        texts = QWidget()
+        column = QVBoxLayout(texts)
+        column.setContentsMargins(0, 0, 0, 0)
+        for label in (self.problem, self.old, self.told, self.chosen):
+            column.addWidget(label)
+        column.addStretch(1)
+        # texts of any length have room of their own, so that no control moves
+        results = QScrollArea(widgetResizable=True)
+        results.setFrameShape(QScrollArea.Shape.NoFrame)
+        results.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        results.setWidget(texts)
+        for widget in (self.limited, self.measure_button, self.bar):
             left.addWidget(widget)
+        left.addWidget(results, 2)
         controls = QWidget()
         controls.setLayout(left)
         controls.setFixedWidth(CONTROLS)
         sides = QSplitter(Qt.Orientation.Horizontal)
-        for title, view, note in (
-            ("Photograph", self.view, None),
-            ("Rendered", self.rendered, self.no_render),
+        for title, view, more, note in (
+            ("Photograph", self.view, None, None),
+            ("Rendered", self.rendered, self.bright, self.no_render),
         ):
-            side, column = QWidget(), QVBoxLayout()
+            side, column, head = QWidget(), QVBoxLayout(), QHBoxLayout()
             column.setContentsMargins(0, 0, 0, 0)
-            column.addWidget(QLabel(title))
+            head.addWidget(QLabel(title))
+            head.addStretch(1)
+            if more is not None:
+                head.addWidget(more)
+            head.addWidget(Zooms(view))
+            column.addLayout(head)
             column.addWidget(view, 1)
             if note is not None:
                 column.addWidget(note)
@@ -230,6 +259,9 @@ class PhotographWindow(QWidget):
         layout = QHBoxLayout(self)
         layout.addWidget(controls)
         layout.addWidget(sides, 1)
+        room = self.bar.sizePolicy()
+        room.setRetainSizeWhenHidden(True)
+        self.bar.setSizePolicy(room)
         self.bar.setVisible(False)
 
     def _connect(self) -> None:
@@ -238,6 +270,9 @@ class PhotographWindow(QWidget):
         self.off_button.clicked.connect(self._ask_off)
         self.measure_button.clicked.connect(self.measure)
         self.limited.toggled.connect(self._limit)
+        for signal in (self.colour.currentIndexChanged, self.axis.currentIndexChanged, self.region.sigRegionChanged):
+            signal.connect(lambda *_: self._show_age())
+        self.bright.toggled.connect(lambda on: self._show_rendered())
         self.names.currentRowChanged.connect(lambda row: self._show())
         self.runner.failed.connect(self._failed)
         self.runner.progress.connect(lambda job: self.bar.show_share(job.done))
@@ -264,6 +299,15 @@ class PhotographWindow(QWidget):
             self.region.setPos((0.25 * width, 0.25 * height))
             self.region.setSize((0.5 * width, 0.5 * height))
         self.region.setVisible(on)
+        self._show_age()
+
+    def _show_age(self) -> None:
+        """Whether the figures are of what is set."""
+        try:
+            old = self.found is not None and self._asked_for != (self.paths, self.wishes())
+        except InputError:
+            old = True
+        self.old.setVisible(old)
 
     def _refresh(self) -> None:
         self.measure_button.setEnabled(bool(self.paths))
@@ -272,6 +316,7 @@ class PhotographWindow(QWidget):
             self.told.setText(EMPTY)
             self.chosen.clear()
             self.problem.clear()
+        self._show_age()
 
     def _shown(self) -> Path | None:
         row = self.names.currentRow()
@@ -286,8 +331,8 @@ class PhotographWindow(QWidget):
             if self._shown() != path:
                 return
             self.view.item.set_levels(levels)
-            if not self._fitted:
-                self._fitted = True
+            if self._fitted != self.view.item.size:
+                self._fitted = self.view.item.size
                 self.view.fit()
 
         self.runner.run(PICTURE, "reading", lambda progress, cancelled: levels_of(path), then, interrupt=True)
@@ -299,6 +344,7 @@ class PhotographWindow(QWidget):
         if found is not None:
             self.found = found
             self._show_line()
+            self._show_age()
 
     def _failed(self, job: Job[object]) -> None:
         self.bar.setVisible(False)
@@ -332,13 +378,16 @@ class PhotographWindow(QWidget):
         if shown is None or not there:
             return
         scene, frame, images = shown.project.scene, shown.frame, list(shown.images)
+        bright = self.bright.isChecked()
 
         def work(progress: Progress, cancelled: Cancel) -> list[Picture]:
-            made = picture(views(scene, frame)[0], scene, frame, images, False)
+            made = picture(views(scene, frame)[0], scene, frame, images, bright)
             return [] if made is None else pyramid(made)
 
         def then(levels: list[Picture]) -> None:
+            before = self.rendered.item.size
             self.rendered.item.set_levels(levels)
-            self.rendered.fit()
+            if self.rendered.item.size != before:
+                self.rendered.fit()
 
         self.runner.run(RENDERED, "drawing", work, then, interrupt=True)

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
+from PySide6.QtWidgets import QApplication
 
 from render.sensor.develop import develop
 from studio.qt.image.photograph_window import LANE, PICTURE, RENDERED, PhotographWindow
+from studio.qt.image.zooms import Zooms
 from tests.studio.photographs.colour_photographs import HEIGHT, Scene, photograph, write
 from tests.studio.qt.small_session import small_session
 
@@ -93,6 +95,7 @@ def test_a_rectangle_limits_what_is_looked_at(qtbot, made):
     measured(qtbot, made)
     _, v = points(made)
     assert v.min() >= 50 and v.max() < 150 and len(v) > 95
+    assert f"{len(v)} of 100 rows" in made.told.text()
     made.limited.setChecked(False)
     measured(qtbot, made)
     assert len(points(made)[0]) > 0.98 * HEIGHT
@@ -125,6 +128,53 @@ def test_what_cannot_be_measured_is_said_and_the_others_go_on(qtbot, made, tmp_p
     made.set_offs([other])
     measured(qtbot, made)
     assert "size" in made.problem.text() or "size" in made.told.text()
+
+
+def test_figures_of_other_settings_are_said_to_be_old(qtbot, made, tmp_path):
+    assert not made.old.isVisible()
+    measured(qtbot, made)
+    assert not made.old.isVisible()
+    made.colour.setCurrentText("mono")
+    assert made.old.isVisible()
+    made.colour.setCurrentText("auto")
+    assert not made.old.isVisible()
+    made.limited.setChecked(True)
+    assert made.old.isVisible()
+    measured(qtbot, made)
+    assert not made.old.isVisible()
+    made.region.setSize((60.0, 60.0))
+    assert made.old.isVisible()
+    made.limited.setChecked(False)
+    measured(qtbot, made)
+    write(tmp_path / "3.png", photograph(SCENE, seed=3))
+    made.add([tmp_path / "3.png"])
+    assert made.old.isVisible()
+    made.clear()
+    assert not made.old.isVisible()
+
+
+def test_no_control_moves_when_there_are_figures(qtbot, made):
+    controls = (made.colour, made.axis, made.limited, made.measure_button)
+    before = [control.mapTo(made, QPoint(0, 0)) for control in controls]
+    measured(qtbot, made)
+    QApplication.processEvents()
+    assert made.told.text().count(" ") > 10 and made.problem.text() == ""
+    assert [control.mapTo(made, QPoint(0, 0)) for control in controls] == before
+
+
+def test_a_picture_that_was_moved_away_comes_back(qtbot, made, tmp_path):
+    qtbot.waitUntil(lambda: made.runner.job(PICTURE) is None)
+    fitted = made.view.box.viewRect()
+    made.view.box.translateBy(x=1e4)
+    assert not made.view.box.viewRect().intersects(fitted)
+    for zooms in made.findChildren(Zooms):
+        qtbot.mouseClick(zooms.buttons[0], Qt.MouseButton.LeftButton)
+    assert made.view.box.viewRect().intersects(fitted)
+    write(tmp_path / "small.png", photograph(SCENE, seed=3)[:100])
+    made.view.box.translateBy(x=1e4)
+    made.add([tmp_path / "small.png"])
+    qtbot.waitUntil(lambda: made.view.item.size[1] == 100)
+    assert made.view.box.viewRect().intersects(made.view.item.boundingRect())
 
 
 def test_photographs_are_dropped_on_it_and_cleared(qtbot, made, tmp_path):
