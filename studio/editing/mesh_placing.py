@@ -1,4 +1,4 @@
-"""A mesh where it belongs: its up axis, on the ground, as large as the camera sees."""
+"""A mesh where it belongs: its up axis, on the ground or on another part, over an axis, as large as the camera sees."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ UpAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 UP_AXES: tuple[UpAxis, ...] = get_args(UpAxis)
 FILLED = 0.8
 """Of the camera's view, by a part that was fitted to it."""
+STANDS = 1e-6
+"""m from height zero, within which a part's lowest vertex stands on the ground."""
 
 
 def up_axis(item: SceneObject) -> UpAxis | None:
@@ -43,18 +45,50 @@ def with_axis_up(item: SceneObject, vertices: Float, axis: UpAxis) -> SceneObjec
 
 def on_ground(item: SceneObject, vertices: Float) -> SceneObject:
     """Its lowest vertex at height zero. vertices: as of `with_axis_up`."""
+    return _at_height(item, vertices, 0.0)
+
+
+def on_top(item: SceneObject, vertices: Float, boxes: Sequence[tuple[Float, Float]]) -> SceneObject:
+    """Its lowest vertex as high as the highest of what is below or above its own box. vertices: as of `with_axis_up`.
+
+    boxes: of other objects, as of `meeting`. Where there is none, on the ground.
+    """
+    own = transform_points(item.T_world_object.matrix, vertices)
+    low, high = own.min(axis=0)[:2], own.max(axis=0)[:2]
+    around = [_around(box, to_world) for box, to_world in boxes]
+    tops = [top[2] for bottom, top in around if np.all((low < top[:2]) & (bottom[:2] < high))]
+    return _at_height(item, vertices, max(tops, default=0.0))
+
+
+def centred(item: SceneObject, vertices: Float, place: Sequence[float]) -> SceneObject:
+    """The middle of its box over a place, which it keeps its height at. vertices: as of `with_axis_up`."""
+    own = transform_points(item.T_world_object.matrix, vertices)
+    off = np.asarray(place[:2]) - 0.5 * (own.min(axis=0) + own.max(axis=0))[:2]
+    return _moved(item, item.T_world_object.matrix[:3, 3] + np.array([*off, 0.0]))
+
+
+def _at_height(item: SceneObject, vertices: Float, height: float) -> SceneObject:
     matrix = item.T_world_object.matrix
-    lowest = float((vertices @ matrix[2, :3]).min())
-    return _moved(item, np.array([*matrix[:2, 3], -lowest]))
+    return _moved(item, np.array([*matrix[:2, 3], height - float((vertices @ matrix[2, :3]).min())]))
+
+
+def stands(item: SceneObject, vertices: Float) -> bool:
+    """On the ground. vertices: as of `with_axis_up`."""
+    matrix = item.T_world_object.matrix
+    return abs(float((vertices @ matrix[2, :3]).min() + matrix[2, 3])) < STANDS
 
 
 def fitted(item: SceneObject, vertices: Float, scene: Scene) -> SceneObject:
-    """Scaled to FILLED of the camera's view, its middle in the middle of it. vertices: as of `with_axis_up`."""
+    """Scaled to FILLED of the camera's view, its middle in the middle of it; what stands on the ground stays there.
+
+    vertices: as of `with_axis_up`.
+    """
     matrix = item.T_world_object.matrix
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     scale = float(f"{item.scale * FILLED * field_of_view(scene) / float((high - low).max()):.3g}")
     middle = matrix[:3, :3] @ (low + high) / 2.0 * (scale / item.scale)
-    return _moved(item.model_copy(update={"scale": scale}), target(scene) - middle)
+    made = _moved(item.model_copy(update={"scale": scale}), target(scene) - middle)
+    return on_ground(made, vertices * (scale / item.scale)) if stands(item, vertices) else made
 
 
 def on_its_foot(item: SceneObject, vertices: Float, factor: float) -> SceneObject:

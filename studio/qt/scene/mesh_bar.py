@@ -6,12 +6,14 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QGridLayout, QLabel, QMenu, QSizePolicy, QVBoxLayout, QWidget
 
 from render.base.arrays import Float
 from render.base.errors import InputError
+from render.scene.motion import Turntable
 from render.scene.scene import SceneObject
 from render.scene.shape import UNITS, MeshFile
 from studio.editing import mesh_placing
@@ -28,7 +30,8 @@ from studio.qt.scene import mesh_importer
 
 REPLACES = "Another mesh file in its place, shaded as an import of it is; pose, scale and material stay"
 SCALES = "Changes its size: it is scaled until it fills the camera's view, and put in the middle of that"
-
+ON_TOP = "Its lowest point as high as the top of what is below or around it, by their boxes"
+CENTRE = "The middle of its box over the turntable's axis point, or the origin where nothing turns; its height stays"
 
 LINES = 3
 """For which there is room below the buttons."""
@@ -44,6 +47,8 @@ class MeshBar(QWidget):
         self.up = text_button("", "Which axis of the file points up", "choice")
         self.fit = text_button("Scale to fit", SCALES)
         self.ground = text_button("On the ground", "Its lowest point at height zero")
+        self.top = text_button("On top", ON_TOP)
+        self.centre = text_button("Centre", CENTRE)
         self.told = QLabel(wordWrap=True)
         self.told.setObjectName("muted")
         # the fields below stay where they are while its words change
@@ -61,7 +66,7 @@ class MeshBar(QWidget):
         grid = QGridLayout()
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(4)
-        for k, button in enumerate((self.replace, self.up, self.fit, self.ground)):
+        for k, button in enumerate((self.replace, self.up, self.fit, self.centre, self.ground, self.top)):
             grid.addWidget(button, k // 2, k % 2)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -71,6 +76,8 @@ class MeshBar(QWidget):
         self.replace.clicked.connect(lambda: replace_mesh(session, self))
         self.fit.clicked.connect(self._fit)
         self.ground.clicked.connect(self._put_down)
+        self.top.clicked.connect(self._put_on_top)
+        self.centre.clicked.connect(self._put_in_the_middle)
         live(session).changed.connect(self.refresh)
         session.selection_changed.connect(self.refresh)
         session.project_changed.connect(self.refresh)
@@ -83,7 +90,7 @@ class MeshBar(QWidget):
         if item is None:
             return
         vertices = self._vertices(item)
-        for button in (self.up, self.fit, self.ground):
+        for button in (self.up, self.fit, self.ground, self.top, self.centre):
             if vertices is None and button.hasFocus():
                 self.setFocus()  # Qt would give it to the next field, and keys of the 3D view would be typed there
             button.setEnabled(vertices is not None)
@@ -117,7 +124,8 @@ class MeshBar(QWidget):
         by, length = now.scale / item.scale, Unit.of("m")
         before = float((vertices.max(axis=0) - vertices.min(axis=0)).max())
         sizes = " became ".join(f"{length.factor * size:.4g} {length.shown}" for size in (before, by * before))
-        self.session.message.emit("info", f"{now.name} is scaled by {by:.3g}: {sizes}; Ctrl+Z takes it back")
+        still = "; it still stands on the ground" if mesh_placing.stands(item, vertices) else ""
+        self.session.message.emit("info", f"{now.name} is scaled by {by:.3g}: {sizes}{still}; Ctrl+Z takes it back")
 
     def _put_down(self) -> None:
         """How far it moved is said, or that it stood there."""
@@ -131,6 +139,34 @@ class MeshBar(QWidget):
             far = f"{1e3 * abs(by):.4g} mm {'up' if by > 0.0 else 'down'}"
             told = f"{now.name} moved {far}, its lowest point to height zero; Ctrl+Z takes it back"
         self.session.message.emit("info", told)
+
+    def _put_on_top(self) -> None:
+        """Of what shares its place, seen from above."""
+        item = selected_mesh(self.session)
+        if item is None:
+            return
+        look = live(self.session).look
+        others = [one for one in look.placed if _size(look.scene.visible_objects[one.index]) != _size(item)]
+        boxes = [(one.body.bounds, one.T_world_object) for one in others]
+        if self._place("put on top", lambda item, vertices: mesh_placing.on_top(item, vertices, boxes)):
+            self._tell_move(item, "its lowest point to the top of what is below it, or to the ground", "on top")
+
+    def _put_in_the_middle(self) -> None:
+        item, motion = selected_mesh(self.session), self.session.project.scene.motion
+        if item is None:
+            return
+        turns = isinstance(motion, Turntable)
+        place = motion.centre if isinstance(motion, Turntable) else (0.0, 0.0, 0.0)
+        if self._place("centre", lambda item, vertices: mesh_placing.centred(item, vertices, place)):
+            over = "the turntable's axis point" if turns else "the origin"
+            self._tell_move(item, f"the middle of its box over {over}", f"over {over}")
+
+    def _tell_move(self, before: SceneObject, where: str, already: str) -> None:
+        now = selected_mesh(self.session) or before
+        by = np.subtract(now.T_world_object.translation, before.T_world_object.translation)
+        far = 1e3 * float(np.linalg.norm(by))
+        moved = f"{now.name} moved {far:.4g} mm, {where}; Ctrl+Z takes it back"
+        self.session.message.emit("info", moved if far > 0.0 else f"{now.name} stood {already} already")
 
     def _place(self, label: str, change: Callable[[SceneObject, Float], SceneObject]) -> bool:
         """False: it cannot be done, which is told where there is something to tell."""

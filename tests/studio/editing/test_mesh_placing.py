@@ -13,10 +13,13 @@ from studio.editing.mesh_placing import (
     FILLED,
     UP_AXES,
     UpAxis,
+    centred,
     fitted,
     meeting,
     on_ground,
     on_its_foot,
+    on_top,
+    stands,
     up_axis,
     with_axis_up,
 )
@@ -76,6 +79,32 @@ def test_a_fitted_part_fills_its_share_of_the_view_about_its_middle(vertices: Fl
     middle = (scaled.min(axis=0) + scaled.max(axis=0)) / 2.0
     assert in_world(item, middle[None])[0] == pytest.approx(target(scene), abs=2 * NANOMETRE)
     assert item.T_world_object.rotation == POSE.rotation
+
+
+def test_what_stands_on_the_ground_still_stands_there_when_it_is_fitted(vertices: Float) -> None:
+    scene = Project.load(template_folder("plane") / "project.json").scene
+    down = on_ground(ITEM, vertices)
+    assert stands(down, vertices) and not stands(ITEM, vertices)
+    made = fitted(down, vertices, scene)
+    places = in_world(made, made.scale / ITEM.scale * vertices)
+    assert abs(places[:, 2].min()) < NANOMETRE
+    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0)) * made.scale / ITEM.scale
+    assert in_world(made, middle[None])[0, :2] == pytest.approx(target(scene)[:2], abs=NANOMETRE)
+
+
+def test_on_top_of_what_is_below_it_seen_from_above(vertices: Float) -> None:
+    places = in_world(ITEM, vertices)
+    middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
+    below = np.array([[-0.01, -0.01, 0.0], [0.01, 0.01, 0.03]])
+    here, elsewhere = (Pose(translation=(x, middle[1], 0.2)).matrix for x in (middle[0], middle[0] + 5.0))
+    assert in_world(on_top(ITEM, vertices, [(below, here)]), vertices)[:, 2].min() == pytest.approx(0.23, abs=NANOMETRE)
+    assert on_top(ITEM, vertices, [(below, elsewhere)]) == on_ground(ITEM, vertices)
+
+
+def test_centred_over_a_place_at_its_own_height(vertices: Float) -> None:
+    before, after = (in_world(item, vertices) for item in (ITEM, centred(ITEM, vertices, (0.1, -0.2, 7.0))))
+    assert 0.5 * (after.min(axis=0) + after.max(axis=0))[:2] == pytest.approx((0.1, -0.2), abs=NANOMETRE)
+    assert after[:, 2] == pytest.approx(before[:, 2], abs=NANOMETRE)
 
 
 def test_boxes_that_share_space_are_told_and_what_touches_is_not() -> None:

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from render.base.pose import Pose
+from render.scene.motion import NoMotion, Turntable
 from render.scene.scene import SceneObject
 from render.scene.shape import MeshFile
 from studio.qt.core.live_preview import live
@@ -54,6 +56,25 @@ def test_in_too_large_a_unit_it_is_said_to_be_around_the_camera(
     session.document.undo()
     session.document.undo()
     qtbot.waitUntil(lambda: "inside" not in bar.told.text() and "2 x 2 x 2 mm" in bar.told.text())
+
+
+def test_over_the_turntable_and_on_top_of_another_part_by_a_click_each(
+    session: Session, inspector: Inspector, part: list[str], qtbot: QtBot
+) -> None:
+    bar, told = inspector.mesh_bar, []
+    session.message.connect(lambda _, text: told.append(text))
+    session.set(("scene", "motion"), Turntable(centre=(0.05, -0.02, 0.0)))
+    qtbot.mouseClick(bar.centre, Qt.MouseButton.LeftButton)
+    assert session.project.scene.objects[1].T_world_object.translation[:2] == pytest.approx((0.05, -0.02), abs=1e-6)
+    assert "the middle of its box over the turntable's axis point; Ctrl+Z takes it back" in told[-1]
+    qtbot.mouseClick(bar.centre, Qt.MouseButton.LeftButton)
+    assert "ball stood over the turntable's axis point already" in told[-1]
+    qtbot.mouseClick(bar.top, Qt.MouseButton.LeftButton)
+    assert "its lowest point to the top of what is below it, or to the ground" in told[-1]
+    session.document.undo()
+    session.set(("scene", "motion"), NoMotion())
+    qtbot.mouseClick(bar.centre, Qt.MouseButton.LeftButton)
+    assert session.project.scene.objects[1].T_world_object.translation[:2] == pytest.approx((0.0, 0.0), abs=1e-6)
 
 
 def test_a_file_takes_the_place_of_any_object_s_shape(
