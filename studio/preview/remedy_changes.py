@@ -311,7 +311,8 @@ def _changed(project: Project, *steps: Step | None) -> Change:
 
 def _from_to(unit: str, before: float | None, after: float, shown: str = "") -> str:
     as_shown = Unit.of(unit, shown)
-    was = "far away" if before is None else as_shown.format(float(f"{before:.4g}"))
+    factor = as_shown.factor
+    was = "far away" if before is None else as_shown.format(float(f"{factor * before:.4g}") / factor)
     return f"{was} → {as_shown.with_unit(after)}"
 
 

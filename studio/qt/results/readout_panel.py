@@ -27,6 +27,7 @@ from studio.qt.core.widgets import ElidedLabel, keep_size
 from studio.qt.results.placing_fields import PlacingField, PlacingFields
 from studio.qt.results.remedy_list import RemedyList, sentence
 
+NO_LASER, LOADING = "Add a laser to the rig to see what it measures.", "Loading meshes…"
 LEAST_NAME = 72
 """px of the name of a read-out, where there is too little room for the whole."""
 LEFT, SPACING, RIGHT = 10, 8, 4
@@ -41,7 +42,9 @@ class ReadoutPanel(QWidget):
         self._session, self._live = session, live(session)
         self._lasers = LaserBox(session)
         self._lasers.setToolTip("The laser that the read-outs are of")
-        self._hint = QLabel("Add a laser to the rig to see what it measures.", wordWrap=True)
+        self._hint = QLabel(NO_LASER, wordWrap=True)
+        self.step = QLabel(wordWrap=True)
+        self.step.setObjectName("muted")
         self.problem = QLabel("Not of the scene as it is set: the scene tree marks what cannot be.", wordWrap=True)
         self.problem.setObjectName("warning")
         self._hint.setObjectName("muted")
@@ -72,13 +75,14 @@ class ReadoutPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(0)
-        for widget in (self._lasers, self._hint, self.problem):
+        for widget in (self._lasers, self._hint, self.problem, self.step):
             layout.addWidget(widget)
         layout.addWidget(area, 1)
-        for label in (self._hint, self.problem):
+        for label in (self._hint, self.problem, self.step):
             label.setContentsMargins(10, 6, 10, 0)
         self._live.changed.connect(self._refresh)
         session.problems_changed.connect(self._refresh)
+        session.document_replaced.connect(self._start_anew)
         self._lasers.chosen.connect(self._refresh)
         theme.notice.changed.connect(self._paint)
         self.fixes.changed.connect(self._offer_fixes)
@@ -113,14 +117,25 @@ class ReadoutPanel(QWidget):
         """Index of the laser that is read out."""
         return self._lasers.laser
 
+    def _start_anew(self) -> None:
+        """Without the figures of another project."""
+        self._rows = ()
+        self._refresh()
+
     def _refresh(self) -> None:
         look = self._live.look
         names = [laser.name for laser in look.scene.lasers]
         self._lasers.show_names(names)
-        self._hint.setVisible(not names)
+        # as long as some of the meshes are there, and nothing was read out before, figures would be of another scene
+        loading = bool(names) and not self._rows and self._live.is_loading
+        self._hint.setText(LOADING if loading else NO_LASER)
+        self._hint.setVisible(loading or not names)
+        count = look.scene.frame_count
+        self.step.setText(f"As it stands at step {look.step + 1} of {count}")
+        self.step.setVisible(bool(names) and count > 1)
         self.problem.setVisible(bool(names and self._session.problems))
         self._area.setVisible(bool(names))
-        found = readouts(look, self.laser) if names and self._live.ready else None
+        found = readouts(look, self.laser) if names and self._live.ready and not loading else None
         shown = () if found is None else rows(found)
         if found is not None:
             self.placing.show_values(look, self.laser, found)

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QComboBox, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from render.base.pose import Pose
+from render.scene.motion import Turntable
 from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core import theme
@@ -72,6 +73,15 @@ def test_with_two_lasers_the_selected_one_is_read_out(qtbot: QtBot) -> None:
     session.set(LASERS, (first, other))
     session.select((*LASERS, 1))
     qtbot.waitUntil(lambda: value_of(panel, "baseline") == "350 mm")
+
+
+def test_of_a_scene_that_moves_it_says_which_step_it_is_of(qtbot: QtBot) -> None:
+    panel = panel_on(qtbot)
+    session = panel._session
+    assert not panel.step.isVisible()
+    session.set(("scene", "motion"), Turntable(steps=12))
+    session.look_at_step(11)
+    qtbot.waitUntil(lambda: panel.step.isVisible() and panel.step.text() == "As it stands at step 12 of 12")
 
 
 def test_without_a_laser_it_says_what_to_do(qtbot: QtBot) -> None:
