@@ -276,7 +276,7 @@ class MainWindow(QMainWindow):
             "redo": lambda: scene_actions.redo(session),
             "duplicate": where_seen(scene_actions.duplicate, session, self.docks, self.panels.place("viewport")),
             "delete": where_seen(scene_actions.remove, session, self.docks, self.panels.place("viewport")),
-            "rename": self._rename,
+            "rename": lambda: (self.show_panel("scene"), self.panels["scene"].rename_selection()),  # type: ignore
             "hide": where_seen(scene_actions.toggle_visible, session, self.docks, self.panels.place("viewport")),
             "copy_python": lambda: copy_shown(session),
             "deselect": lambda: session.select(()),
@@ -299,7 +299,7 @@ class MainWindow(QMainWindow):
         }
         for key, handler in handlers.items():
             self.commands.connect(key, handler)
-        join_motion(self.panels, self.commands, self.call_panel)
+        self.offer_motion = join_motion(self.panels, self.commands, self.docks, self.call_panel)
         for key, command in SWITCH.items():
             self.commands.connect(command, partial(self.switch_to, key))
         themes = QActionGroup(self)
@@ -323,16 +323,13 @@ class MainWindow(QMainWindow):
         one_of(CellOpener, session).opened.connect(lambda: self.switch_to("measure"))
         session.project_changed.connect(self._tell_document)
         session.document_replaced.connect(self._tell_document)
+        session.document_replaced.connect(lambda: self.offer_motion(self.workspace))
         session.document_replaced.connect(lambda: QTimer.singleShot(TRIM_MS, self, return_what_is_free))
         session.selection_changed.connect(self._tell_selection)
         session.step_changed.connect(lambda: live(session).show_step(session.step))
         session.vary_asked.connect(self._vary)
         runner.failed.connect(self._tell_failure)
         self._tell_selection()
-
-    def _rename(self) -> None:
-        self.show_panel("scene")
-        self.panels["scene"].rename_selection()  # type: ignore[attr-defined]
 
     def _vary(self, path: FieldPath, spec: FieldSpec) -> None:
         from studio.qt.study.study_work import StudyWork
@@ -375,6 +372,7 @@ class MainWindow(QMainWindow):
             self.resize(self.size().boundedTo(size))  # the last workspace's columns may have made it grow
         if not self._restore_panels():
             share_out(self, self.docks, workspace(self.workspace))
+        self.offer_motion(self.workspace)
         hide_stray_tabs(self)
 
     def _send_back(self) -> None:

@@ -10,6 +10,7 @@ from pytestqt.qtbot import QtBot
 
 from render.base.errors import Cancelled
 from render.scene.motion import LinearStage
+from studio.project.document import Document
 from studio.qt.core.jobs import BUSY, RENDER
 from studio.qt.render import motion_panel
 from studio.qt.render.motion_panel import MotionPanel
@@ -41,6 +42,26 @@ def test_f6_and_a_click_on_motion_bring_its_panel(window: MainWindow, qtbot: QtB
     assert panel.isVisible(), "it stays until another workspace is shown"
     window.switch_to("measure")
     assert window.docks["motion"].isHidden()
+
+
+def test_a_project_that_moves_has_the_panel_behind_design_whenever_it_is_set_up(
+    window: MainWindow, qtbot: QtBot
+) -> None:
+    motion, design = window.panels["motion"], window.panels["readout"]
+    assert window.workspace == "setup" and window.docks["motion"].isHidden()
+    window.session.set(("scene", "motion"), LinearStage(step=(0.001, 0.0, 0.0), steps=4))
+    for away in ("measure", "study"):
+        window.switch_to(away)
+        assert window.docks["motion"].isHidden()
+        window.switch_to("setup")
+        qtbot.waitUntil(lambda: not window.docks["motion"].isHidden())
+        qtbot.waitUntil(lambda: not design.visibleRegion().isEmpty())
+        assert motion.visibleRegion().isEmpty()
+    moving = window.session.document.project
+    window.switch_to("render")
+    window.switch_to("setup")
+    window.files.replace(Document(moving, None))
+    qtbot.waitUntil(lambda: not window.docks["motion"].isHidden())
 
 
 def test_a_scan_that_was_stopped_goes_on_as_the_message_says(
