@@ -32,6 +32,14 @@ def scan_steps(session: Session) -> ScanSteps:
     return one_of(ScanSteps, session)
 
 
+def awaits_step(session: Session) -> bool:
+    """The session's step of the shown scan is still to be read: what is shown is the one looked at before."""
+    shown = session.shown
+    if shown is None or shown.scan is None or session.changed or scan_steps(session).problem:
+        return False
+    return session.step < shown.scan.count and shown.frame.step != session.step
+
+
 class ScanSteps(QObject):
     """Keeps the shown scan at the session's step."""
 

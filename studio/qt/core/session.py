@@ -202,13 +202,19 @@ class Session(QObject):
 
     @property
     def stale(self) -> bool:
+        """What is shown is not of the scene as it is now, nor can developing make it so, or is of another step."""
+        shown = self.shown
+        return shown is not None and not shown.cell and (self.changed or shown.frame.step != self.step)
+
+    @property
+    def changed(self) -> bool:
         """The scene has changed since the shown render, in a way that developing cannot follow."""
-        shown, project, step = self.shown, self.project, self.step
+        shown, project = self.shown, self.project
         if shown is None or shown.cell:
             return False
         if self._judged is None or self._judged[0] is not shown or self._judged[1] is not project:
             self._judged = shown, project, shown.is_stale(project)
-        return self._judged[2] or shown.frame.step != step
+        return self._judged[2]
 
     def select(self, path: FieldPath) -> None:
         """Select an item of the scene by its path: ("scene", "objects", 0), ("scene", "rig", "camera"), ()."""

@@ -1,4 +1,4 @@
-"""From step to step of a motion: buttons, a slider, play."""
+"""From step to step of a motion: buttons, a slider, play; a scan that is shown plays as fast as its frames are read."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from studio.qt.core.boxes import Slider
 from studio.qt.core.icons import icon, icon_button
+from studio.qt.core.scan_steps import awaits_step
 from studio.qt.core.session import Session
 
 PLAY_MS = 100
+PATIENCE = 100
+"""Times `PLAY_MS` that a frame is waited for, at most."""
 
 
 class StepBar(QWidget):
@@ -25,6 +28,7 @@ class StepBar(QWidget):
         self.play = icon_button("play", "Play the motion", self.toggle_play)
         self._timer = QTimer(self, interval=PLAY_MS)
         self._timer.timeout.connect(self._next)
+        self._waited = 0
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         for widget in (
@@ -58,10 +62,20 @@ class StepBar(QWidget):
         self.play.setIcon(icon("pause" if self._timer.isActive() else "play"))
 
     def _next(self) -> None:
+        if self._waited < PATIENCE and self._is_to_come():
+            self._waited += 1
+            return
+        self._waited = 0
         if self.session.step >= self.slider.maximum():
             self.toggle_play()
         else:
             self.session.look_at_step(self.session.step + 1)
+
+    def _is_to_come(self) -> bool:
+        """The picture of the step that is looked at, where that is of a scan."""
+        session, shown = self.session, self.session.shown
+        undeveloped = session.measures and shown is not None and shown.scan is not None and not shown.images
+        return awaits_step(session) or (undeveloped and not session.changed)
 
     def _follow(self) -> None:
         self.slider.blockSignals(True)

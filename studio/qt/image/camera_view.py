@@ -7,10 +7,8 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
-    QFrame,
     QHBoxLayout,
     QLabel,
-    QPushButton,
     QSizePolicy,
     QVBoxLayout,
     QWidget,
@@ -25,9 +23,10 @@ from studio.qt.core.jobs import JobRunner
 from studio.qt.core.laser_box import laser_of
 from studio.qt.core.live_preview import live
 from studio.qt.core.render import Render
+from studio.qt.core.scan_steps import awaits_step, scan_steps
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import flush, upper_and_lower
-from studio.qt.image.badge_text import badge_text
+from studio.qt.image.badge import Badge
 from studio.qt.image.image_item import PictureView
 from studio.qt.image.line_overlay import BOX_PX, LineOverlay, swatch
 from studio.qt.image.picture_clicks import PictureClicks
@@ -73,13 +72,10 @@ class CameraView(QWidget):
         self.saturated.setChecked(True)
         self.zooms = Zooms(self.view)
         self.readout = QLabel()
-        self.badge = QFrame()
-        self.badge_text = QLabel(wordWrap=True)
+        self.badge = Badge(session)
         self.lines = QWidget()
-        self.render_button = QPushButton("Render")
         self.is_live, self._gave_way = True, False
         """The render was shown until the scene changed; it comes back where that is undone."""
-        self._ground = ""
         self._chosen = 0
         self._last_shown: Render | None = None
         self._size = (0, 0)
@@ -126,10 +122,6 @@ class CameraView(QWidget):
         self.first.addWidget(self.lines, 1)
         self.bar.addLayout(self.first, 1)
         self.bar.addWidget(self.zooms)
-        badge = QHBoxLayout(self.badge)
-        badge.setContentsMargins(8, 3, 4, 3)
-        badge.addWidget(self.badge_text, 1)
-        badge.addWidget(self.render_button)
         self.readout.setContentsMargins(8, 2, 8, 2)
         self.readout.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.readout.setMinimumWidth(1)
@@ -156,6 +148,7 @@ class CameraView(QWidget):
         session.project_changed.connect(self._project_changed)
         session.step_changed.connect(self._step_changed)
         session.problems_changed.connect(self._show_badge)
+        scan_steps(session).told.connect(self._project_changed)
         session.developed.connect(self._developed)
         session.measured.connect(self._draw_overlay)
         session.hover_changed.connect(self._hover_changed)
@@ -166,18 +159,10 @@ class CameraView(QWidget):
         self.choice.activated.connect(self._choose)
         for box in (self.bright, self.saturated):
             box.toggled.connect(lambda on: self.refresh())
-        self.render_button.clicked.connect(session.render_asked)
 
     def _colour(self) -> None:
         self.view.setBackground(theme.colours().base)
-        self._colour_badge()
-
-    def _colour_badge(self) -> None:
-        colours = theme.colours()
-        ground = theme.mixed(colours.warning, colours.window, 0.3) if self.session.stale else colours.raised
-        if ground != self._ground:  # a style sheet paints everything anew
-            self._ground = ground
-            self.badge.setStyleSheet(f"QFrame, QLabel {{ background: {ground}; }}")
+        self.badge.colour()
 
     # what is shown
 
@@ -191,14 +176,14 @@ class CameraView(QWidget):
         new = shown is not self._last_shown
         self._last_shown = shown
         if new:
-            self.is_live, self._gave_way = shown is None or self.session.stale, False
+            self.is_live, self._gave_way = shown is None or self._has_changed(), False
             self._read_out(None)
         self._fill_choice()
         self._profile_of_view()
         self.refresh()
 
     def _project_changed(self) -> None:
-        changed = self.session.shown is not None and self.session.stale
+        changed = self._has_changed()
         if changed and not self.is_live:
             self.is_live = self._gave_way = True
             self._fill_choice()
@@ -207,6 +192,10 @@ class CameraView(QWidget):
             self._fill_choice()
             self.refresh()
         self._show_badge()
+
+    def _has_changed(self) -> bool:
+        """The shown render is not what is looked at, nor will it be in a moment."""
+        return self.session.stale and not awaits_step(self.session)
 
     def _step_changed(self) -> None:
         self.live.show_step(self.session.step)
@@ -256,12 +245,7 @@ class CameraView(QWidget):
         self.profile.show_laser(view.laser if view is not None and view.kind in OF_A_LASER else 0)
 
     def _show_badge(self) -> None:
-        shown = self.session.shown
-        text = badge_text(self.session, self.is_live, self.live.ready)
-        self._colour_badge()
-        self.badge_text.setText(text)
-        self.render_button.setVisible(shown is None or self.session.stale)
-        self.badge.setVisible(bool(text))
+        self.badge.tell(self.is_live, self.live.ready)
 
     # the live estimate
 

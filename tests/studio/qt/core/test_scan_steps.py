@@ -17,6 +17,7 @@ from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.jobs import RENDER
 from studio.qt.core.render import Render
+from studio.qt.image.camera_view import CameraView
 from studio.qt.render import motion_panel
 from studio.qt.render.motion_panel import MotionPanel
 from studio.qt.render.render_row import describe
@@ -96,6 +97,26 @@ class TestOpened:
         assert cell(panel, "RMSE / µm") == pytest.approx(1e6 * own.errors.depth_z.rmse, rel=5e-3)
         assert cell(panel, "Points") == own.points.valid.sum()
         assert set(opened.cloud.steps.tolist()) == {2}
+
+    def test_it_plays_its_own_frames_as_fast_as_they_are_read(self, opened: MainWindow, qtbot: QtBot) -> None:
+        """A live estimate of a scene that "has changed" stood in their place while it played."""
+        session, camera, bar = opened.session, opened.panels["camera"], results_of(opened).scan_bar.steps
+        assert isinstance(camera, CameraView)
+        seen: list[tuple[int, int, bool, str]] = []
+
+        def look() -> None:
+            frame = session.shown.frame.step if session.shown is not None else -1
+            seen.append((session.step, frame, camera.is_live, camera.badge.text.text()))
+
+        session.step_changed.connect(look)
+        session.renders_changed.connect(look)
+        qtbot.mouseClick(bar.play, Qt.MouseButton.LeftButton)
+        shown(opened, qtbot, 2)
+        assert session.step == 2 and [frame for _, frame, _, _ in seen if frame != seen[0][1]]
+        assert all(step - frame <= 1 for step, frame, _, _ in seen), "no step is gone past unseen"
+        assert not any(live for _, _, live, _ in seen)
+        assert not any("estimate" in told or "changed" in told for *_, told in seen)
+        assert not camera.badge.isVisible()
 
     def test_a_step_is_chosen_in_the_plot_of_all(self, opened: MainWindow, qtbot: QtBot) -> None:
         panel = results_of(opened)

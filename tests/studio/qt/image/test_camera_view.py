@@ -77,15 +77,15 @@ def drag_with_shift(view, start, end):
 
 
 def test_without_a_render_the_view_is_a_live_estimate(qtbot, unrendered):
-    assert unrendered.is_live and unrendered.badge.isVisible() and unrendered.render_button.isVisible()
-    assert "estimate" in unrendered.badge_text.text()
+    assert unrendered.is_live and unrendered.badge.isVisible() and unrendered.badge.render_button.isVisible()
+    assert "estimate" in unrendered.badge.text.text()
     assert len(unrendered.overlay.truth.xData) > 50
     assert np.ptp(grabbed(unrendered)) > 100
 
 
 def test_the_button_of_the_badge_asks_for_a_render(qtbot, unrendered):
     with qtbot.waitSignal(unrendered.session.render_asked):
-        qtbot.mouseClick(unrendered.render_button, Qt.MouseButton.LeftButton)
+        qtbot.mouseClick(unrendered.badge.render_button, Qt.MouseButton.LeftButton)
 
 
 def test_the_live_line_follows_a_dragged_laser(qtbot, unrendered):
@@ -116,8 +116,8 @@ def test_a_render_takes_the_place_of_the_estimate(qtbot, unrendered):
 def test_a_changed_scene_makes_the_render_stale_and_goes_live(qtbot, made):
     session = made.session
     session.set(("scene", "objects", 0, "scale"), 1.01)
-    assert made.session.stale and made.is_live and made.badge.isVisible() and made.render_button.isVisible()
-    assert "changed" in made.badge_text.text()
+    assert made.session.stale and made.is_live and made.badge.isVisible() and made.badge.render_button.isVisible()
+    assert "changed" in made.badge.text.text()
     choose(made, "Image")
     assert not made.is_live and made.badge.isVisible()
     session.document.undo()
@@ -128,8 +128,8 @@ def test_the_picture_of_a_studys_cell_says_so_beside_the_projects_values(qtbot, 
     shown = made.session.shown
     shown.cell, shown.name = "a key", "Sweep 1: 5 mW, repeat 1"
     made.session.renders_changed.emit()
-    assert made.badge.isVisible() and "a study's cell" in made.badge_text.text()
-    assert "5 mW" in made.badge_text.text()
+    assert made.badge.isVisible() and "a study's cell" in made.badge.text.text()
+    assert "5 mW" in made.badge.text.text()
 
 
 def test_what_was_looked_at_comes_back_where_the_change_is_undone(qtbot, made):

@@ -92,7 +92,7 @@ def test_a_second_click_on_render_ends_nothing(qtbot, panel):
     places = [panel.start_button.mapTo(panel, place) for place in places]
     press(qtbot, panel.start_button)
     job = panel.runner.job()
-    qtbot.waitUntil(panel.cancel_button.isVisible)
+    qtbot.waitUntil(lambda: panel.cancel_button.isVisible() and job.state is State.RUNNING)
     QApplication.processEvents()
     assert {panel.childAt(place) for place in places} == {panel.start_button} and not panel.start_button.isEnabled()
     for place in places:

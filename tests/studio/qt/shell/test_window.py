@@ -220,7 +220,7 @@ class TestImpossibleMaterial:
 
     def test_estimates_are_not_passed_off_as_those_of_the_scene(self, told: MainWindow) -> None:
         camera, design = told.panels["camera"], told.panels["readout"]
-        assert "not of the scene" in camera.badge_text.text() and camera.badge.isVisible()  # type: ignore[attr-defined]
+        assert "not of the scene" in camera.badge.text.text() and camera.badge.isVisible()  # type: ignore[attr-defined]
         assert design.problem.isVisible()  # type: ignore[attr-defined]
 
     def test_a_long_message_wraps_within_the_window(self, told: MainWindow, qtbot: QtBot) -> None:
