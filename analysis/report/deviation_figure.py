@@ -18,6 +18,8 @@ from render.base.arrays import Float
 
 BANDS = ("#2166ac", "#67a9cf", "#d1e5f0", "#a6d96a", "#a6d96a", "#fddbc7", "#ef8a62", "#b2182b")
 """Below the tolerance in blue, within in green, above in red: also told apart by their lightness."""
+EVEN_BANDS = (*BANDS[:3], "#c4c4c4", "#c4c4c4", *BANDS[5:])
+"""Of a range that no tolerance parts: nothing in it is right or wrong."""
 MOST_DRAWN = 120_000
 CALLOUTS = 5
 LABEL_PT = 7.0
@@ -48,7 +50,7 @@ FALSE = 0.01
 
 def levels(value: Float, lower: float | None, upper: float | None) -> Float:
     """(9,) edges of the bands, m: two within the tolerance about its middle, three beyond each of its limits."""
-    if lower is None or upper is None or not upper > lower:
+    if not _has_tolerance(lower, upper):
         limit = nice_limit(value)
         return np.linspace(-limit, limit, len(BANDS) + 1)
     least, most = lower, upper
@@ -62,6 +64,10 @@ def levels(value: Float, lower: float | None, upper: float | None) -> Float:
     return np.concatenate([lower - beyond[::-1], [lower, 0.5 * (lower + upper), upper], upper + beyond])
 
 
+def _has_tolerance(lower: float | None, upper: float | None) -> bool:
+    return lower is not None and upper is not None and upper > lower
+
+
 def draw(what: DeviationMap, seed: int = 0) -> Any:
     """A matplotlib figure; call within nothing else. Points beyond MOST_DRAWN are drawn by chance."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -69,10 +75,13 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
 
     across, up = _axes(what.towards)
     place = 1e3 * np.column_stack([what.points @ across, what.points @ up])
-    place -= place.min(axis=0) if len(place) else 0.0
+    near = ~far_off(what.value)
+    part = place[near] if near.any() else place  # points far off would make a speck of it
+    place -= part.min(axis=0) if len(part) else 0.0
     edges = levels(what.value, what.lower, what.upper)
-    colours, norm = ListedColormap(list(BANDS)), BoundaryNorm(edges * 1e6, len(BANDS))
-    wide, tall = np.ptp(place, axis=0) if len(place) else (1.0, 1.0)
+    bands = BANDS if _has_tolerance(what.lower, what.upper) else EVEN_BANDS
+    colours, norm = ListedColormap(list(bands)), BoundaryNorm(edges * 1e6, len(bands))
+    wide, tall = np.ptp(part, axis=0) if len(part) else (1.0, 1.0)
     if tall > wide:  # lying down it is larger on a page that is wider than this is high
         place, wide, tall = np.column_stack([place[:, 1], wide - place[:, 0]]), tall, wide
     height = float(np.clip(4.6 * max(tall, 0.36 * wide) / max(wide, 1e-9), 2.2, 5.6)) + 0.5
@@ -86,13 +95,15 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         # room for the callouts about a map that is low
         pad = 0.5 * max(0.36 * wide - tall, 0.1 * tall)
         drawing.set_ylim(-pad, tall + pad)
+        drawing.set_xlim(-0.03 * wide, 1.03 * wide)
+        beyond = int(np.any((place < (-0.03 * wide, -pad)) | (place > (1.03 * wide, tall + pad)), axis=1).sum())
         drawing.grid(False)
         drawing.set(xlabel="mm", ylabel="mm")
         drawing.xaxis.set_major_locator(MaxNLocator(max(1, min(8, round(8.0 * wide / max(tall, 1e-9)))), integer=True))
         named, apart, stray = _of_the_part(what, place)
         drawing.set_title(
             f"Deviation from the nominal surface, + outside (too much)\n"
-            f"A number is the median of a place{_without_number(stray, len(place) - len(named))}"
+            f"A number is the median of a place{_without_number(stray, len(place) - len(named), beyond)}"
         )
         fine = np.linspace(edges[0], edges[-1], 49) * 1e6
         counts, _ = np.histogram(clipped, fine)
@@ -110,10 +121,11 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         return made
 
 
-def _without_number(stray: int, count: int) -> str:
+def _without_number(stray: int, count: int, beyond: int) -> str:
+    left = f", {beyond} lie{'s' * (beyond == 1)} beyond the picture" if beyond else ""
     if count == 0:
-        return ""
-    return f", {count} stray {'or unsure ' * (count > stray)}point{' has' if count == 1 else 's have'} none"
+        return left
+    return f", {count} stray {'or unsure ' * (count > stray)}point{' has' if count == 1 else 's have'} none{left}"
 
 
 def _of_the_part(what: DeviationMap, place: Float) -> tuple[NDArray[np.int64], float, int]:

@@ -67,11 +67,12 @@ def front(report: ReportInput) -> dict[str, Any] | None:
         "text": [line for line in told.text.splitlines() if line.strip()],
         "verdict": verdict,
         "verdict_text": VERDICTS[verdict],
-        "judged": _judged(bool(surface["verdict"]), gauges, judged_objects(report)),
+        "judged": _judged(bool(surface["verdict"]), gauges, judged_objects(report), len(rows) > 0),
         "decided_by": _decided_by(verdict, surface["verdict"], gauges, [_named(row) for row in report.measures]),
         "part_of": report.part_of,
         "rule": RULE if verdict != "none" else "",
         "surface": surface,
+        "banded": told.lower is not None and told.upper is not None,
         "map": _map(report, rows) if len(rows) else None,
         "how": _how(report, rows),
     }
@@ -104,7 +105,7 @@ def _who(report: ReportInput) -> list[tuple[str, str]]:
     told = report.delivery
     return [
         ("Customer", told.customer),
-        ("Part", told.part or report.title),
+        ("Part", told.part),
         ("Part number", told.part_number),
         ("Order number", told.order_number),
         ("Author", told.author),
@@ -124,8 +125,9 @@ def _named(row: dict[str, Any]) -> str:
     return f"{row['name']} ({counts_text(counts)})" if len(counts) > 1 else str(row["name"])
 
 
-def _judged(surface: bool, gauges: list[str], objects: str) -> str:
-    """What the verdict is of: the surface, measures, and how many of these have a tolerance."""
+def _judged(surface: bool, gauges: list[str], objects: str, compared: bool) -> str:
+    """What the verdict is of: the surface, measures, and how many of these have a tolerance. compared: the report has
+    the surface's deviation."""
     having = sum(bool(one) for one in gauges)
     of = [f"the surface ({objects})"] if surface else []
     if having:
@@ -138,6 +140,8 @@ def _judged(surface: bool, gauges: list[str], objects: str) -> str:
         rest = "; the other has no tolerance" if without == 1 else "; the others have no tolerance"
     elif without:
         rest = "; the measure has no tolerance" if without == 1 else "; the measures have no tolerance"
+    if compared and not surface:
+        rest += "; the surface has no tolerance"
     return f"Of {' and '.join(of)}{rest}."
 
 

@@ -189,9 +189,11 @@ class Project(Model):
 
     def read_as(self, other: Self) -> Self:
         """The same project, with what `other` reads off what was measured: measures of the part, each of the same laser
-        as there, and the report."""
+        as there, and the report; and with its name, by which a report is called."""
         own = of_same_lasers(other.measures, other.scene, self.scene)
-        return self.model_copy(update={**{name: getattr(other, name) for name in READ_OFF}, "measures": own})
+        return self.model_copy(
+            update={**{name: getattr(other, name) for name in READ_OFF}, "measures": own, "name": other.name}
+        )
 
     def to_text(self) -> str:
         """The file's text: every value written out, so that a project outlives a change of defaults."""

@@ -31,7 +31,10 @@ from studio.scan.own_files import MEASURE_COLUMNS
 from studio.scan.sheet_lean import T_section_camera, section_of
 from studio.scan.stages import Measurement
 
-OF_SCAN = "it is of a whole scan: run one (F6, Motion), or Measure > Measure the scan again"
+OF_SCAN = "it is of a whole scan: run one (F6, Motion)"
+SINCE_SCAN = "the scan was measured without it: Measure > Measure the scan again reads it off the scan's frames"
+WITHOUT_SCAN = (OF_SCAN, SINCE_SCAN)
+"""Reasons of what is of all steps, as long as these have not been measured with it."""
 MOST_BYTES = 256 << 20
 """Of a table of measures."""
 FIGURES = ("value", "sigma_random", "sigma_systematic", "sigma", "truth", "error", "error_in_sigmas")
@@ -88,11 +91,12 @@ def read_each(gauges: Sequence[Gauge], step: int, of: Mapping[int, tuple[Profile
 def kept_readings(gauges: Sequence[Gauge], scanned: Sequence[Gauge], rows: object) -> dict[Gauge, Reading]:
     """Of the gauges that are of all steps, as a scan has recorded those that it was measured with.
 
-    scanned: these; rows: `measures_record` of them, as read from a file that may be damaged.
+    scanned: these; rows: `measures_record` of them, as read from a file that may be damaged. Others have no value yet.
     """
     found = {}
     entries = [row if isinstance(row, dict) else {} for row in rows] if isinstance(rows, list) else []
     for gauge in (one for one in gauges if one.of_scan):
+        found[gauge] = Reading(gauge, None, reason=SINCE_SCAN)
         for was, row in zip(scanned, entries, strict=False):
             if (was.kind, was.laser, was.regions) == (gauge.kind, gauge.laser, gauge.regions):
                 names = ("value", "sigma_random", "sigma_systematic", "truth")

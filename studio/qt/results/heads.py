@@ -14,6 +14,9 @@ AWAITED = "The render goes on: figures come with ambient light, without whose no
 REFINING = "The render goes on: light is still to come, and these are the figures so far."
 MEASURING = "Measuring… until then these are the figures of the settings before."
 UNMEASURED = "This step's points are still to come: a scan's steps are measured as they stand, not while they play."
+GROWING = (
+    "The points in the 3D view are of the scan that was started last; these are the figures of what is shown here."
+)
 CHANGED = "The scene has changed since: these are the figures of the render as it was."
 MEASURED_OTHERWISE = (
     "Measure > Measure the scan again: figures of all steps are as they were measured, and sensor, extraction or "
@@ -22,12 +25,15 @@ MEASURED_OTHERWISE = (
 """The remedy first."""
 
 
-def heads(session: Session, step_problem: str) -> list[str]:
-    """Nothing where they are what they seem. step_problem: why the step that is looked at cannot be shown."""
+def heads(session: Session, step_problem: str, growing: bool = False) -> list[str]:
+    """Nothing where they are what they seem. step_problem: why the step that is looked at cannot be shown; growing: the
+    points in the 3D view are of another scan."""
     render = session.shown
     told = [f"Step {session.step + 1} cannot be shown: {step_problem}"] if step_problem else []
     if render is None:
         return told
+    if growing:
+        told.append(GROWING)
     if one_of(FiguresAge, session).old:
         told.append(MEASURING)
     if render.cell:

@@ -36,7 +36,7 @@ from studio.qt.results.part_steps import PartSteps, value_of_worst
 from studio.qt.results.part_table import PartTable
 from studio.qt.results.results_profile import ProfilePlot
 from studio.qt.results.scan_bar import ScanBar
-from studio.scan.gauging import OF_SCAN, judged_over_steps, kept_readings, profiles, read_each
+from studio.scan.gauging import OF_SCAN, WITHOUT_SCAN, judged_over_steps, kept_readings, profiles, read_each
 from studio.scan.measures_in_3d import MeasureIn3D, measures_in_3d
 from studio.scan.remarks import best
 from studio.scan.sheet_lean import SECTIONS, lean_text
@@ -349,7 +349,7 @@ class PartTab(QWidget):
             before = f"{text.rstrip('.')}. " if text else ""
             text = f"{before}Points are by {method_name(self._method)}, as Extraction says."
         if self._read and self.placing is None:
-            kept = entry is not None and entry["reason"] != OF_SCAN
+            kept = entry is not None and entry["reason"] not in WITHOUT_SCAN
             text = f"{self._steps.told(gauge, kept, self._read)} {text}".strip()
         self.told.setText(text)
         self.told.setToolTip(text)

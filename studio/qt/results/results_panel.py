@@ -95,7 +95,7 @@ class ResultsPanel(QWidget):
         self.part = PartTab(session, self.profile, self.scan_bar)
         self.region = RegionTab(session, self.rows, self.profile, self.scan_bar)
         self.scan_steps = scan_steps(session)
-        self.top = HeadRow(self.scan_bar)
+        self.top, self._growing = HeadRow(self.scan_bar), False
         self.head, self.head_text = self.top.banner, self.top.banner.text
         self.notices = Remarks(), Remarks()
         """What a reader should notice: below the measures, and in a tab where there is no room below them."""
@@ -230,7 +230,12 @@ class ResultsPanel(QWidget):
             notice.show_texts(remarks)
 
     def _tell_head(self) -> None:
-        self.top.tell(heads(self.session, self.scan_steps.problem))
+        self.top.tell(heads(self.session, self.scan_steps.problem, self._growing))
+
+    def tell_growing(self, growing: bool) -> None:
+        """The points in the 3D view are of a scan that is not shown here."""
+        self._growing = growing
+        self._tell_head()
 
     def _project_changed(self) -> None:
         if self.session.project.measured_in != self.profile.section:

@@ -17,6 +17,7 @@ def points_in_3d(session: Session, panels: Panels, viewport: Any) -> ErrorCloud:
 
     def join_results(results: Any) -> None:
         made.choose(results.view)
+        made.of_scan_changed.connect(results.tell_growing)
         results.view_changed.connect(made.choose)
         results.scan_bar.scope_changed.connect(made.show_all_steps)
         results.region.changed.connect(lambda: made.show_box(results.region.region))

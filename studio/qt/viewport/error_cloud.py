@@ -45,6 +45,8 @@ class ErrorCloud(QObject):
     """`visible` is another."""
     boxed = Signal(object)
     """A `Box` about points, to be told of."""
+    of_scan_changed = Signal(bool)
+    """Points are of a scan that runs, or was stopped, and not of what is shown."""
 
     def __init__(self, session: Session, view: View3D) -> None:
         super().__init__(view)
@@ -147,7 +149,8 @@ class ErrorCloud(QObject):
 
     def clear(self) -> None:
         """Nothing is shown, until something is measured."""
-        self._clouds, self._measured, self._of_scan = [], [], False
+        self._clouds, self._measured = [], []
+        self._tell_of_scan(False)
         self._draw()
 
     def begin_scan(self, image_scale: float) -> None:
@@ -159,8 +162,14 @@ class ErrorCloud(QObject):
         """More points of a running scan."""
         self._sample.add(columns)
         self._clouds = [self._sample.points]
-        self._of_scan, self.image_scale = True, self._scan_scale
+        self.image_scale = self._scan_scale
+        self._tell_of_scan(True)
         self._draw()
+
+    def _tell_of_scan(self, of_scan: bool) -> None:
+        if of_scan != self._of_scan:
+            self._of_scan = of_scan
+            self.of_scan_changed.emit(of_scan)
 
     def frame(self) -> None:
         """Bring the points into the middle of the view; a few far outliers must not make the others a speck."""
@@ -220,7 +229,8 @@ class ErrorCloud(QObject):
             if not self._of_scan:
                 self.clear()
             return
-        self._of_scan, self.image_scale = False, render.scanner_scale
+        self.image_scale = render.scanner_scale
+        self._tell_of_scan(False)
         self._draw()
 
     def _draw(self) -> None:

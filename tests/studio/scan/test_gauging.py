@@ -23,6 +23,7 @@ from render.scene.motion import LinearStage
 from render.world.world import build_world
 from studio.project.project import Project
 from studio.scan.gauging import (
+    SINCE_SCAN,
     judged_over_steps,
     kept_readings,
     measures_record,
@@ -317,11 +318,12 @@ def test_a_scan_has_one_flatness_which_is_kept_for_who_looks_at_it(tmp_path: Pat
     wider = project.measures[1].model_copy(update={"name": "renamed", "upper": 0.2})
     elsewhere = wider.model_copy(update={"regions": ((-0.05, 0.05),)})
     kept = kept_readings([wider, elsewhere], project.measures, record)
-    assert list(kept) == [wider] and kept[wider].value == pytest.approx(float(row["value"]))
+    assert kept[elsewhere].reason == SINCE_SCAN and not kept[elsewhere].points
+    assert kept[wider].value == pytest.approx(float(row["value"]))
     told = kept_readings([wider], project.measures, [{}, {**record[1], "remark": "points miss the surface"}])
     assert told[wider].remark == "points miss the surface", "what is amiss with it is seen in the window as well"
     assert kept_readings([wider], project.measures, [{"value": "damaged"}, None])[wider].reason == ""
-    assert kept_readings([wider], project.measures, "damaged") == {}
+    assert kept_readings([wider], project.measures, "damaged")[wider].reason == SINCE_SCAN
 
 
 def test_a_flatness_of_one_step_is_refused_with_what_is_allowed(tmp_path: Path) -> None:

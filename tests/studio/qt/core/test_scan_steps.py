@@ -17,11 +17,13 @@ from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.jobs import RENDER
 from studio.qt.core.render import Render
+from studio.qt.core.scan_steps import scan_steps
 from studio.qt.image.camera_view import CameraView
 from studio.qt.render import motion_panel
 from studio.qt.render.motion_panel import MotionPanel
 from studio.qt.render.render_row import describe
 from studio.qt.render.render_table import RenderTable
+from studio.qt.results.heads import GROWING
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell import file_actions
 from studio.qt.shell.window import MainWindow
@@ -283,6 +285,20 @@ class TestRun:
         assert render.scan is not None and render.scan.count == 3 and render.source == window.session.project
         window.switch_to("measure")
         assert results_of(window).scan_bar.isVisible()
+
+    def test_while_it_runs_the_figures_of_another_are_said_to_be_of_another(
+        self, moving: MotionPanel, window: MainWindow, scanned: tuple[Path, Path], qtbot: QtBot, tmp_path: Path
+    ) -> None:
+        scan_steps(window.session).show(open_folder(scanned[1]))
+        shown(window, qtbot, 0)
+        head = results_of(window).head_text
+        assert GROWING not in head.text()
+        with qtbot.waitSignal(moving.grew, timeout=60_000):
+            moving.run_into(tmp_path / "out")
+        assert GROWING in head.text()
+        qtbot.waitUntil(lambda: len(window.session.renders) == 2)
+        shown(window, qtbot, 0)
+        qtbot.waitUntil(lambda: GROWING not in head.text())
 
     def test_looking_at_a_render_meanwhile_loses_none_of_its_points(
         self, moving: MotionPanel, window: MainWindow, opened: MainWindow, qtbot: QtBot
