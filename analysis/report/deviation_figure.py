@@ -21,6 +21,8 @@ BANDS = ("#2166ac", "#67a9cf", "#d1e5f0", "#a6d96a", "#a6d96a", "#fddbc7", "#ef8
 EVEN_BANDS = (*BANDS[:3], "#c4c4c4", "#c4c4c4", *BANDS[5:])
 """Of a range that no tolerance parts: nothing in it is right or wrong."""
 MOST_DRAWN = 120_000
+MARGIN = 0.06
+"""Of the part's width, on either side of it."""
 CALLOUTS = 5
 LABEL_PT = 7.0
 FRAME = 0.65
@@ -50,7 +52,7 @@ FALSE = 0.01
 
 def levels(value: Float, lower: float | None, upper: float | None) -> Float:
     """(9,) edges of the bands, m: two within the tolerance about its middle, three beyond each of its limits."""
-    if not _has_tolerance(lower, upper):
+    if lower is None or upper is None or not upper > lower:
         limit = nice_limit(value)
         return np.linspace(-limit, limit, len(BANDS) + 1)
     least, most = lower, upper
@@ -64,10 +66,6 @@ def levels(value: Float, lower: float | None, upper: float | None) -> Float:
     return np.concatenate([lower - beyond[::-1], [lower, 0.5 * (lower + upper), upper], upper + beyond])
 
 
-def _has_tolerance(lower: float | None, upper: float | None) -> bool:
-    return lower is not None and upper is not None and upper > lower
-
-
 def draw(what: DeviationMap, seed: int = 0) -> Any:
     """A matplotlib figure; call within nothing else. Points beyond MOST_DRAWN are drawn by chance."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -79,7 +77,7 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
     part = place[near] if near.any() else place  # points far off would make a speck of it
     place -= part.min(axis=0) if len(part) else 0.0
     edges = levels(what.value, what.lower, what.upper)
-    bands = BANDS if _has_tolerance(what.lower, what.upper) else EVEN_BANDS
+    bands = EVEN_BANDS if what.lower is None or what.upper is None else BANDS
     colours, norm = ListedColormap(list(bands)), BoundaryNorm(edges * 1e6, len(bands))
     wide, tall = np.ptp(part, axis=0) if len(part) else (1.0, 1.0)
     if tall > wide:  # lying down it is larger on a page that is wider than this is high
@@ -95,8 +93,10 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         # room for the callouts about a map that is low
         pad = 0.5 * max(0.36 * wide - tall, 0.1 * tall)
         drawing.set_ylim(-pad, tall + pad)
-        drawing.set_xlim(-0.03 * wide, 1.03 * wide)
-        beyond = int(np.any((place < (-0.03 * wide, -pad)) | (place > (1.03 * wide, tall + pad)), axis=1).sum())
+        drawing.set_xlim(-MARGIN * wide, (1.0 + MARGIN) * wide)
+        beyond = int(
+            np.any((place < (-MARGIN * wide, -pad)) | (place > ((1.0 + MARGIN) * wide, tall + pad)), axis=1).sum()
+        )
         drawing.grid(False)
         drawing.set(xlabel="mm", ylabel="mm")
         drawing.xaxis.set_major_locator(MaxNLocator(max(1, min(8, round(8.0 * wide / max(tall, 1e-9)))), integer=True))

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from analysis.deviation import Alignment
+from analysis.report.delivery import Delivery
 from analysis.report.deviation_figure import draw
 from render.base.errors import InputError
 from render.scene.shape import Unit
@@ -51,6 +52,11 @@ CHANGED = "Changed since: Compare again. The figures are still of what they name
 ANOTHER = "Other points are shown since: Compare again."
 MARGIN = 8
 FIRST_UM, MOST_UM = 100.0, 1_000_000.0
+INTO_REPORT = "The report judges the surface by this tolerance as well, of this part; as yet it has another, or none"
+TAKEN = (
+    "The report judges the surface by this tolerance now, against the part as it was scanned and without an alignment; "
+    "Ctrl+Z takes it back"
+)
 SPOTS_HINT = "x,y,z of six places on the nominal, mm, world: three, two, one; between them semicolons"
 
 
@@ -85,6 +91,7 @@ class DeviationTab(QWidget):
         self.least, self.most = _limit(-FIRST_UM), _limit(FIRST_UM)
         self.compare_button = text_button("Compare", "", "primary")
         self.export = text_button("Export as CSV…", "Every point, with map and figures beside it")
+        self.to_report = text_button("Into the report", INTO_REPORT)
         self.in_view = QCheckBox("In 3D")
         self.in_view.setToolTip("While this is looked at the points there have the colours of their deviation")
         self.in_view.setChecked(True)
@@ -110,6 +117,7 @@ class DeviationTab(QWidget):
         ):
             changed.connect(self._check)
         self.compare_button.clicked.connect(self.compare)
+        self.to_report.clicked.connect(self._judge_the_report)
         self.export.clicked.connect(self._ask)
         for signal in (session.renders_changed, session.measured):
             signal.connect(self.refresh)
@@ -152,6 +160,7 @@ class DeviationTab(QWidget):
             shown = limits if told.has_tolerance else (-1e-6 * FIRST_UM, 1e-6 * FIRST_UM)
             for box, limit in zip((self.least, self.most), shown, strict=True):
                 box.setValue(box.minimum() if limit is None else 1e6 * limit)
+        self._check()
 
     def take_nominal(self, file: Path | None) -> None:
         """A CAD file; None: the part as it was scanned."""
@@ -236,12 +245,23 @@ class DeviationTab(QWidget):
         """An input may have changed; with its old value again the figures count again."""
         there, changed = self.compared is not None, self.is_changed
         self.export.setEnabled(there and not changed)
+        self.to_report.setEnabled(self._as_report() != self.session.project.delivery)
         if self.changed.isHidden() != changed:
             return
         self.changed.setVisible(changed)
         for widget in (self.told, self.map):
             widget.setEnabled(not changed)
         self._place()
+
+    def _as_report(self) -> Delivery:
+        """The report as it would be judged by this tolerance."""
+        part, told = self.part.currentText(), self.session.project.delivery
+        limits = {"lower": _metres(self.least), "upper": _metres(self.most)}
+        return told.model_copy(update={**limits, "surface_of": "" if part == ALL or self.part.count() < 2 else part})
+
+    def _judge_the_report(self) -> None:
+        if self.session.set(("delivery",), self._as_report(), "surface tolerance of the report"):
+            self.session.message.emit("info", TAKEN)
 
     def _place(self) -> None:
         """Into the 3D view, where it is to be seen; what is of other inputs is not, as nothing there would say so."""
@@ -313,6 +333,7 @@ class DeviationTab(QWidget):
         limits.addWidget(self.least, 1)
         limits.addWidget(QLabel("to"))
         limits.addWidget(self.most, 1)
+        limits.addWidget(self.to_report)
         self.form.addRow("Part", self.part)
         self.form.addRow("Nominal", self.nominal)
         self.form.addRow("", files)

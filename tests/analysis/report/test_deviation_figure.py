@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 
 from analysis.deviation import tells_no_place, unsure_of_place
-from analysis.report.deviation_figure import BANDS, DeviationMap, draw, levels
+from analysis.report.deviation_figure import BANDS, EVEN_BANDS, DeviationMap, draw, levels
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -41,6 +42,27 @@ def test_far_off_points_beside_the_part_are_counted_and_a_dent_is_pointed_at(cou
     assert [one.get_text() for one in made.axes[0].texts] == ["1: -300 µm"]
     told = {0: "", 1: ", 1 stray point has none", 7: ", 7 stray points have none"}[count]
     assert made.axes[0].get_title(loc="left").partition("\n")[2] == f"A number is the median of a place{told}"
+
+
+def test_without_a_tolerance_nothing_is_drawn_as_within_it() -> None:
+    x = np.linspace(0.0, 0.1, 50)
+    points = np.column_stack([x, 0.3 * x, np.zeros(50)])
+    for limits, bands in (((None, None), EVEN_BANDS), ((None, 1e-4), EVEN_BANDS), ((-1e-4, 1e-4), BANDS)):
+        made = draw(DeviationMap(points, np.linspace(-9e-5, 9e-5, 50), UP, *limits))
+        drawn = {to_hex(colour) for colour in np.atleast_2d(made.axes[0].collections[0].get_facecolor())}
+        assert bands[4] in drawn and (BANDS[4] in drawn) == (bands is BANDS)
+
+
+def test_points_far_off_leave_the_part_as_large_as_it_is_and_are_counted() -> None:
+    """Two points half a metre off made a strip of a part of 100 mm."""
+    x, y = (one.ravel() for one in np.meshgrid(np.linspace(0.0, 0.1, 100), np.linspace(0.0, 0.05, 50)))
+    value = 5e-6 * np.random.default_rng(4).standard_normal(len(x))
+    points = np.column_stack([x, y, value])
+    value[:2], points[:2] = 0.5, (0.05, 0.7, 0.5)
+    made = draw(DeviationMap(points, value, UP, -5e-5, 5e-5))
+    low, high = made.axes[0].get_ylim()
+    assert high - low < 70.0 and made.axes[0].get_xlim() == pytest.approx((-6.0, 106.0), abs=0.1)
+    assert made.axes[0].get_title(loc="left").endswith("2 stray points have none, 2 lie beyond the picture")
 
 
 @pytest.mark.parametrize("kind", ["alone on their scan lines", "much less sure than most"])

@@ -61,7 +61,8 @@ def test_the_pages_hold_what_was_said_once_and_as_text() -> None:
 
 def test_the_pages_are_headed_by_the_part_and_by_the_project_where_it_has_no_name() -> None:
     assert told(handed(part="Bracket"))["title"] == "Bracket"
-    assert told(handed(author="Ada"))["title"] == make_report().title
+    nameless = told(handed(author="Ada"))
+    assert nameless["title"] == make_report().title and "Part" not in dict(nameless["who"])
 
 
 @pytest.mark.parametrize(
@@ -138,6 +139,9 @@ def test_a_verdict_says_how_many_measures_it_is_of() -> None:
     assert found["judged"] in render_page(report)
     none = replace(report, measures=rows[1:])
     assert told(none)["judged"] == "Of the surface (laser); the measures have no tolerance."
+    bare = replace(handed(customer="Ada"), measures=rows[:1])
+    assert told(bare)["judged"] == "Of the measure; the surface has no tolerance."
+    assert "Green lies within" in render_page(report) and "Green lies within" not in render_page(bare)
 
 
 def test_a_flatness_and_a_bow_are_defined_where_they_appear_and_only_there() -> None:

@@ -104,6 +104,26 @@ def test_it_begins_with_the_object_and_the_limits_of_the_report(
     assert (tab.question().lower, tab.question().upper) == pytest.approx((-1e-4, 1e-4))
 
 
+def test_the_report_takes_the_tolerance_by_a_click(panel: NominalPanel, session: Session, qtbot: QtBot) -> None:
+    """The screen said "undecided", and the report of the same points had no verdict of the surface."""
+    tab, told = panel.deviation, []
+    session.message.connect(lambda _, text: told.append(text))
+    session.set(("delivery", "customer"), "Ada")
+    tab.least.setValue(-20.0)
+    tab.part.setCurrentIndex(1)
+    assert tab.to_report.isEnabled()
+    qtbot.mouseClick(tab.to_report, Qt.MouseButton.LeftButton)
+    taken = session.project.delivery
+    assert (taken.customer, taken.surface_of) == ("Ada", tab.part.itemText(1))
+    assert (taken.lower, taken.upper) == pytest.approx((-2e-5, 1e-4))
+    assert not tab.to_report.isEnabled() and "against the part as it was scanned" in told[-1]
+    tab.most.setValue(-50.0)
+    qtbot.mouseClick(tab.to_report, Qt.MouseButton.LeftButton)
+    assert session.project.delivery == taken and "upper is above lower" in told[-1]
+    session.document.undo()
+    assert not session.project.delivery.has_tolerance
+
+
 def test_a_mesh_is_read_in_the_unit_that_is_chosen(panel: NominalPanel, tmp_path: Path) -> None:
     tab = panel.deviation
     panel.show_tab(tab)
