@@ -16,6 +16,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkBillboardTextActor3D, vtkPo
 from analysis.report.colour import wavelength_colour
 from render.base.arrays import Float
 from render.base.pose import transform_points
+from studio.editing.units import Unit
 from studio.preview import rig_drawing
 from studio.preview.preview import Body, Look
 from studio.project.document import FieldPath
@@ -316,15 +317,15 @@ class ViewportScene:
         for label in self._labels:
             self.renderer.RemoveActor(label)
         low, high = lines.reshape(-1, 3).min(axis=0), lines.reshape(-1, 3).max(axis=0)
-        self._labels = []
+        self._labels, length = [], Unit.of("m")
         for axis in range(2):
             first, last = round(low[axis] / step), round(high[axis] / step)
             every = -(-(last - first + 1) // MOST_LABELS)
             for k in (k for k in range(first, last + 1) if k % every == 0):
                 # along the two sides of the ground that the usual view has in front
                 place = (k * step, low[1], 0.0) if axis == 0 else (high[0], k * step, 0.0)
-                self._labels.append(_label(f"{1e3 * k * step:g}", place))
-        self._labels[-1].SetInput(self._labels[-1].GetInput() + " mm")
+                self._labels.append(_label(f"{length.factor * k * step:g}", place))
+        self._labels[-1].SetInput(f"{self._labels[-1].GetInput()} {length.shown}")
         for label in self._labels:
             self.renderer.AddActor(label)
             label.SetVisibility(self.shown["grid"])

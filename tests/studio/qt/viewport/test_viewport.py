@@ -16,6 +16,7 @@ from pytestqt.qtbot import QtBot
 from render.base.pose import Pose
 from render.scene.shape import Box
 from studio.editing.placement import target
+from studio.editing.units import SHOWN
 from studio.project.document import Document, replaced
 from studio.project.project import Project
 from studio.project.templates import template_folder
@@ -334,3 +335,16 @@ def test_everything_is_in_view_lamps_as_well(viewport: Viewport) -> None:
     for light in scene.lights:
         x, y = viewport.view.eye.project(light.T_world_light.matrix[None, :3, 3], viewport.view.pixels)[0]
         assert 0.0 <= x <= width and 0.0 <= y <= height
+
+
+def test_the_ground_is_labelled_in_the_unit_that_lengths_are_shown_in(
+    viewport: Viewport, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(SHOWN, "m", "cm")
+    scene = viewport.scene
+    scene._grid_box = ()  # as at the next start, from which another unit holds
+    viewport._draw()
+    texts = [label.GetInput() for label in scene._labels]
+    assert texts[-1].endswith(" cm") and not any("mm" in text for text in texts)
+    step = 100.0 * scene.spacing
+    assert all(abs(float(text.removesuffix(" cm")) / step % 1.0) < 1e-6 for text in texts)
