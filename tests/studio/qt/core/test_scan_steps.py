@@ -16,19 +16,16 @@ from render.base.errors import Cancelled, InputError
 from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.jobs import RENDER
-from studio.qt.core.render import Render
-from studio.qt.core.scan_steps import scan_steps
-from studio.qt.image.camera_view import CameraView
 from studio.qt.render import motion_panel
 from studio.qt.render.motion_panel import MotionPanel
 from studio.qt.render.render_row import describe
 from studio.qt.render.render_table import RenderTable
-from studio.qt.results.heads import GROWING
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell import file_actions
 from studio.qt.shell.window import MainWindow
 from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan_folder import image_scale_of, open_folder
+from tests.studio.qt.core.scan_hands import results_of, shown
 from tests.studio.qt.shell.window_hands import answer
 from tests.studio.scan_of_steps import SCALE, small_project, small_scan
 
@@ -36,30 +33,6 @@ from tests.studio.scan_of_steps import SCALE, small_project, small_scan
 @pytest.fixture(scope="module")
 def scanned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return small_scan(tmp_path_factory.mktemp("scan"))
-
-
-def results_of(window: MainWindow) -> ResultsPanel:
-    panel = window.panels["results"]
-    assert isinstance(panel, ResultsPanel)
-    panel.scan_bar.scope.setCurrentIndex(0)
-    return panel
-
-
-def shown(window: MainWindow, qtbot: QtBot, step: int) -> Render:
-    """The scan's step, measured."""
-
-    def there() -> bool:
-        render = window.session.shown
-        return (
-            render is not None
-            and render.scan is not None
-            and render.frame.step == step
-            and len(render.measurements) == 3
-        )
-
-    qtbot.waitUntil(there)
-    assert window.session.shown is not None
-    return window.session.shown
 
 
 def cell(panel: ResultsPanel, row: str, column: int = 0) -> float:
@@ -99,26 +72,6 @@ class TestOpened:
         assert cell(panel, "RMSE / µm") == pytest.approx(1e6 * own.errors.depth_z.rmse, rel=5e-3)
         assert cell(panel, "Points") == own.points.valid.sum()
         assert set(opened.cloud.steps.tolist()) == {2}
-
-    def test_it_plays_its_own_frames_as_fast_as_they_are_read(self, opened: MainWindow, qtbot: QtBot) -> None:
-        """A live estimate of a scene that "has changed" stood in their place while it played."""
-        session, camera, bar = opened.session, opened.panels["camera"], results_of(opened).scan_bar.steps
-        assert isinstance(camera, CameraView)
-        seen: list[tuple[int, int, bool, str]] = []
-
-        def look() -> None:
-            frame = session.shown.frame.step if session.shown is not None else -1
-            seen.append((session.step, frame, camera.is_live, camera.badge.text.text()))
-
-        session.step_changed.connect(look)
-        session.renders_changed.connect(look)
-        qtbot.mouseClick(bar.play, Qt.MouseButton.LeftButton)
-        shown(opened, qtbot, 2)
-        assert session.step == 2 and [frame for _, frame, _, _ in seen if frame != seen[0][1]]
-        assert all(step - frame <= 1 for step, frame, _, _ in seen), "no step is gone past unseen"
-        assert not any(live for _, _, live, _ in seen)
-        assert not any("estimate" in told or "changed" in told for *_, told in seen)
-        assert not camera.badge.isVisible()
 
     def test_a_step_is_chosen_in_the_plot_of_all(self, opened: MainWindow, qtbot: QtBot) -> None:
         panel = results_of(opened)
@@ -285,20 +238,6 @@ class TestRun:
         assert render.scan is not None and render.scan.count == 3 and render.source == window.session.project
         window.switch_to("measure")
         assert results_of(window).scan_bar.isVisible()
-
-    def test_while_it_runs_the_figures_of_another_are_said_to_be_of_another(
-        self, moving: MotionPanel, window: MainWindow, scanned: tuple[Path, Path], qtbot: QtBot, tmp_path: Path
-    ) -> None:
-        scan_steps(window.session).show(open_folder(scanned[1]))
-        shown(window, qtbot, 0)
-        head = results_of(window).head_text
-        assert GROWING not in head.text()
-        with qtbot.waitSignal(moving.grew, timeout=60_000):
-            moving.run_into(tmp_path / "out")
-        assert GROWING in head.text()
-        qtbot.waitUntil(lambda: len(window.session.renders) == 2)
-        shown(window, qtbot, 0)
-        qtbot.waitUntil(lambda: GROWING not in head.text())
 
     def test_looking_at_a_render_meanwhile_loses_none_of_its_points(
         self, moving: MotionPanel, window: MainWindow, opened: MainWindow, qtbot: QtBot

@@ -1,0 +1,78 @@
+"""A scan that plays shows its own frames; beside one that runs, the figures of another are said to be of another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from studio.project.document import Document
+from studio.qt.core.scan_steps import scan_steps
+from studio.qt.image.camera_view import CameraView
+from studio.qt.render.motion_panel import MotionPanel
+from studio.qt.results.heads import GROWING
+from studio.qt.shell.window import MainWindow
+from studio.scan.scan_folder import open_folder
+from tests.studio.qt.core.scan_hands import results_of, shown
+from tests.studio.scan_of_steps import small_project, small_scan
+
+
+@pytest.fixture(scope="module")
+def scanned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    return small_scan(tmp_path_factory.mktemp("scan"))
+
+
+@pytest.fixture
+def opened(window: MainWindow, scanned: tuple[Path, Path], qtbot: QtBot) -> MainWindow:
+    assert window.files.open(scanned[1])
+    shown(window, qtbot, 0)
+    return window
+
+
+@pytest.fixture
+def moving(window: MainWindow, tmp_path: Path) -> MotionPanel:
+    file = tmp_path / "moving" / "steps.json"
+    window.files.replace(Document(small_project().save(file), file))
+    panel = window.panels["motion"]
+    assert isinstance(panel, MotionPanel)
+    panel.scale.setCurrentText("half size")
+    window.show_panel("motion")
+    return panel
+
+
+def test_it_plays_its_own_frames_as_fast_as_they_are_read(opened: MainWindow, qtbot: QtBot) -> None:
+    """A live estimate of a scene that "has changed" stood in their place while it played."""
+    session, camera, bar = opened.session, opened.panels["camera"], results_of(opened).scan_bar.steps
+    assert isinstance(camera, CameraView)
+    seen: list[tuple[int, int, bool, str]] = []
+
+    def look() -> None:
+        frame = session.shown.frame.step if session.shown is not None else -1
+        seen.append((session.step, frame, camera.is_live, camera.badge.text.text()))
+
+    session.step_changed.connect(look)
+    session.renders_changed.connect(look)
+    qtbot.mouseClick(bar.play, Qt.MouseButton.LeftButton)
+    shown(opened, qtbot, 2)
+    assert session.step == 2 and [frame for _, frame, _, _ in seen if frame != seen[0][1]]
+    assert all(step - frame <= 1 for step, frame, _, _ in seen), "no step is gone past unseen"
+    assert not any(live for _, _, live, _ in seen)
+    assert not any("estimate" in told or "changed" in told for *_, told in seen)
+    assert not camera.badge.isVisible()
+
+
+def test_while_it_runs_the_figures_of_another_are_said_to_be_of_another(
+    moving: MotionPanel, window: MainWindow, scanned: tuple[Path, Path], qtbot: QtBot, tmp_path: Path
+) -> None:
+    scan_steps(window.session).show(open_folder(scanned[1]))
+    shown(window, qtbot, 0)
+    head = results_of(window).head_text
+    assert GROWING not in head.text()
+    with qtbot.waitSignal(moving.grew, timeout=60_000):
+        moving.run_into(tmp_path / "out")
+    assert GROWING in head.text()
+    qtbot.waitUntil(lambda: len(window.session.renders) == 2)
+    shown(window, qtbot, 0)
+    qtbot.waitUntil(lambda: GROWING not in head.text())
