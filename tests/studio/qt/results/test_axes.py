@@ -38,7 +38,8 @@ def test_labels_of_a_low_plot_do_not_lie_over_each_other(qtbot: QtBot, height: i
     widget.addItem(plot)
     plot.plot(np.arange(50.0), 123.4 + span * np.random.default_rng(1).random(50))
     widget.resize(400, height)
-    widget.show()
+    with qtbot.waitExposed(widget):
+        widget.show()
     found = labels(plot.getAxis("left"))
     assert found and all(above[1] <= below[0] + 1.0 for above, below in pairwise(found)), found
 
@@ -50,7 +51,8 @@ def test_steps_are_numbered_by_whole_numbers(qtbot: QtBot, count: int) -> None:
     plot = StepsPlot()
     qtbot.addWidget(plot)
     plot.resize(600, 300)
-    plot.show()
+    with qtbot.waitExposed(plot):
+        plot.show()
     plot.show_steps("likelihood", np.zeros(count), np.ones(count), ERROR_VIEWS[0])
     found = [text for _, _, text in labels(plot.plot.getAxis("bottom"))]
     assert len(found) >= 2 and all(text.isdigit() for text in found), found
