@@ -76,8 +76,8 @@ def ask_changed_on_disk(parent: QWidget, path: Path) -> Literal["over", "elsewhe
 
 
 def ask_under_way(parent: QWidget, what: str) -> bool:
-    """Whether to go although a render is under way; what: a sentence about it."""
-    return _ask_to_go(parent, "under-way", "Under way", "Stop the render?", "Stop it", what)
+    """Whether to go although a render or an export is under way; what: a sentence about it."""
+    return _ask_to_go(parent, "under-way", "Under way", "Stop what is under way?", "Stop it", what)
 
 
 def ask_loss(parent: QWidget, what: str) -> bool:

@@ -54,8 +54,8 @@ MARGIN = 8
 FIRST_UM, MOST_UM = 100.0, 1_000_000.0
 INTO_REPORT = "The report judges the surface by this tolerance as well, of this part; as yet it has another, or none"
 TAKEN = (
-    "The report judges the surface by this tolerance now, against the part as it was scanned and without an alignment; "
-    "Ctrl+Z takes it back"
+    "Reports that are exported from now on judge the surface by this tolerance, against the part as it was scanned and "
+    "without an alignment; Ctrl+Z takes it back"
 )
 SPOTS_HINT = "x,y,z of six places on the nominal, mm, world: three, two, one; between them semicolons"
 

@@ -313,8 +313,11 @@ class PartTab(QWidget):
         of = "" if entry is None or entry["readings"] > 1 else self._steps.of_which(gauge)
         if entry is not None:
             _, value, sigma, _, _, _, error, _ = cells(entry)
-            # counts have no room beside a name: the tip has them
+            # counts have no room beside a name: the tip has them, but for those that leave it undecided
             verdict = "not measured" if entry["reason"] else marked_verdict(entry)
+            missing = entry["verdicts"].get("none", 0) if entry["readings"] > 1 else 0
+            if missing and entry["verdict"] == "undecided":
+                verdict += f", {missing} of {entry['readings']} not measured"
             verdict = f"{verdict}{of}" if verdict != NONE or not of else of.removeprefix(", ")
             texts[1:] = [value_of_worst(entry, value), sigma, error, verdict]
         tip = measure_tip(gauge, entry, of)

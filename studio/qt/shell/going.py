@@ -8,6 +8,7 @@ from analysis.report.units import counted, percent
 from studio.qt.calibrate.calibration_work import CalibrationWork
 from studio.qt.core.jobs import RENDER, JobRunner, duration
 from studio.qt.core.session import Session
+from studio.qt.results.export_actions import LANE as EXPORT
 from studio.qt.shell.panels import Panels
 
 COSTLY = 60.0
@@ -17,7 +18,7 @@ STAY = "Keep with the project, in the menu of the list of renders, keeps one."
 
 @dataclass(frozen=True)
 class Going:
-    """render: a sentence about the one under way that a person asked for; empty: there is none."""
+    """render: a sentence about what is under way that a person asked for, a render or an export; empty: nothing is."""
 
     render: str = ""
     renders: int = 0
@@ -55,6 +56,8 @@ def what_goes(session: Session, runner: JobRunner, panels: Panels, *, quits: boo
     asked = job is not None and job.name == "render" and panels["render"].asked and not job.cancel_asked  # type: ignore[attr-defined]
     done = percent(job.done, 0) if asked and job is not None else ""
     told = f"A render is under way, {done} of it done, and is lost." if done else ""
+    if quits and (exports := [one.name.removeprefix("export ") for one in runner.jobs(EXPORT)]):
+        told = f"{told} {', '.join(exports)} {'is' if len(exports) == 1 else 'are'} still being written.".strip()
     made = [one for one in session.renders if one.is_kept_nowhere]
     seconds = sum(sum(one.frame.seconds.values()) for one in made)
     return Going(told, len(made), seconds, _calibration(session) if quits else "")

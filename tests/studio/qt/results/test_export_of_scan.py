@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import shutil
 from collections.abc import Iterator
 from html import unescape
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
+from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QMainWindow
 from pytestqt.qtbot import QtBot
 
@@ -25,7 +27,7 @@ from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.heads import measured_otherwise
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.results.scan_again import KEY, ScanAgain
-from studio.qt.results.scan_bar import ScanBar
+from studio.qt.results.scan_bar import OLD, ScanBar
 from studio.qt.shell.file_actions import _scanned
 from studio.runtime.preferences import PreferencesFile
 from studio.scan.scan_folder import open_folder
@@ -119,6 +121,25 @@ def test_the_logo_lies_beside_the_project_of_now_and_not_where_the_scan_was_run(
     bench.bar.scope.setCurrentIndex(1)
     assert 'alt="Logo"' in bench.write("export_html", tmp_path / "one.html", qtbot).read_text()
     assert not [text for _, text in bench.told if "The logo" in text]
+    bench.close()
+
+
+def test_a_report_that_is_older_than_a_tolerance_says_so_when_it_is_opened(
+    scanned: tuple[Path, Path], tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It said "no tolerance was given" to who had just given one."""
+    shutil.copytree(scanned[1], tmp_path / "scan")
+    (tmp_path / "scan" / "report.html").write_text("as it was")
+    manifest = tmp_path / "scan" / "scan.json"
+    manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "report": ["report.html"]}))
+    bench = Bench((scanned[0], tmp_path / "scan"), tmp_path, qtbot)
+    monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: True)
+    bench.told.clear()
+    bench.bar.report.click()
+    assert OLD not in [text for _, text in bench.told]
+    bench.session.set(("delivery", "upper"), 1e-4)
+    bench.bar.report.click()
+    assert bench.told[-1] == ("warning", OLD)
     bench.close()
 
 
