@@ -113,7 +113,7 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
             if limit is not None:
                 bars.axhline(limit * 1e6, color=INK, lw=0.8, ls="--")
         bars.axhline(0.0, color=MUTED, lw=0.6)
-        bars.set(ylabel="deviation (µm), + outside, \u2212 inside", xlabel="points", ylim=(fine[0], fine[-1]))
+        bars.set(ylabel="deviation (µm)", xlabel="points", ylim=(fine[0], fine[-1]))
         bars.set_title("Bands")
         made.canvas.draw()  # where things are is known from here on
         _point_at(drawing, what, place, named, apart)
@@ -122,7 +122,8 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
 
 
 def _without_number(stray: int, count: int, beyond: int) -> str:
-    left = f", {beyond} lie{'s' * (beyond == 1)} beyond the picture" if beyond else ""
+    # on a line of its own: the title has no more room beside the bands
+    left = f",\n{beyond} lie{'s' * (beyond == 1)} beyond the picture" if beyond else ""
     if count == 0:
         return left
     return f", {count} stray {'or unsure ' * (count > stray)}point{' has' if count == 1 else 's have'} none{left}"

@@ -62,7 +62,7 @@ def test_points_far_off_leave_the_part_as_large_as_it_is_and_are_counted() -> No
     made = draw(DeviationMap(points, value, UP, -5e-5, 5e-5))
     low, high = made.axes[0].get_ylim()
     assert high - low < 70.0 and made.axes[0].get_xlim() == pytest.approx((-6.0, 106.0), abs=0.1)
-    assert made.axes[0].get_title(loc="left").endswith("2 stray points have none, 2 lie beyond the picture")
+    assert made.axes[0].get_title(loc="left").endswith("2 stray points have none,\n2 lie beyond the picture")
 
 
 @pytest.mark.parametrize("kind", ["alone on their scan lines", "much less sure than most"])
