@@ -1,4 +1,4 @@
-"""From step to step of a motion: buttons, a slider, play; a scan that is shown plays as fast as its frames are read."""
+"""From step to step of a motion: buttons, a slider, play; a scan plays as fast as its steps are measured."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from studio.qt.core.scan_steps import awaits_step
 from studio.qt.core.session import Session
 
 PLAY_MS = 100
-PATIENCE = 100
-"""Times `PLAY_MS` that a frame is waited for, at most."""
+PATIENCE = 50
+"""Times `PLAY_MS` that a step of a scan is waited for, at most."""
 
 
 class StepBar(QWidget):
@@ -72,10 +72,12 @@ class StepBar(QWidget):
             self.session.look_at_step(self.session.step + 1)
 
     def _is_to_come(self) -> bool:
-        """The picture of the step that is looked at, where that is of a scan."""
+        """The picture of the step that is looked at, where that is of a scan, or its points."""
         session, shown = self.session, self.session.shown
-        undeveloped = session.measures and shown is not None and shown.scan is not None and not shown.images
-        return awaits_step(session) or (undeveloped and not session.changed)
+        if shown is None or shown.scan is None or session.changed or not session.measures:
+            return awaits_step(session)
+        measured = bool(shown.measurements or not shown.project.scene.lasers)
+        return awaits_step(session) or not (shown.images and measured)
 
     def _follow(self) -> None:
         self.slider.blockSignals(True)

@@ -13,7 +13,7 @@ STOPPED = "This render was stopped early: light is missing, and the figures are 
 AWAITED = "The render goes on: figures come with ambient light, without whose noise they would be too good."
 REFINING = "The render goes on: light is still to come, and these are the figures so far."
 MEASURING = "Measuring… until then these are the figures of the settings before."
-UNMEASURED = "This step's points are still to come: a scan's steps are measured as they stand, not while they play."
+UNMEASURED = "This step's points are still to come: the steps of a scan are read and measured as they are looked at."
 GROWING = (
     "The points in the 3D view are of the scan that was started last; these are the figures of what is shown here."
 )
