@@ -48,16 +48,44 @@ def on_ground(item: SceneObject, vertices: Float) -> SceneObject:
     return _at_height(item, vertices, 0.0)
 
 
-def on_top(item: SceneObject, vertices: Float, boxes: Sequence[tuple[Float, Float]]) -> SceneObject:
-    """Its lowest vertex as high as the highest of what is below or above its own box. vertices: as of `with_axis_up`.
+def on_top(item: SceneObject, vertices: Float, others: Sequence[Float]) -> SceneObject:
+    """Its lowest vertex as high as the highest place of others that is below or above its own box.
 
-    boxes: of other objects, as of `meeting`. Where there is none, on the ground.
+    vertices: as of `with_axis_up`; others: (t, 3, 3) m corners of triangles in the world. Where there is none, on the
+    ground.
     """
     own = transform_points(item.T_world_object.matrix, vertices)
     low, high = own.min(axis=0)[:2], own.max(axis=0)[:2]
-    around = [_around(box, to_world) for box, to_world in boxes]
-    tops = [top[2] for bottom, top in around if np.all((low < top[:2]) & (bottom[:2] < high))]
-    return _at_height(item, vertices, max(tops, default=0.0))
+    return _at_height(item, vertices, max((highest_within(one, low, high) for one in others), default=-np.inf))
+
+
+def highest_within(triangles: Float, low: Float, high: Float) -> float:
+    """Largest z of triangles (t, 3, 3) above a rectangle (2,), (2,) of the ground, m; -inf: there is none.
+
+    Of a triangle that is cut by the rectangle it is at a corner of the one or the other, or where their sides meet.
+    """
+    there = np.all((triangles[..., :2].min(axis=1) < high) & (triangles[..., :2].max(axis=1) > low), axis=1)
+    found, corners = [-np.inf], triangles[there]
+    within = np.all((corners[..., :2] >= low) & (corners[..., :2] <= high), axis=2)
+    found += corners[..., 2][within].tolist()
+    start, side = corners, np.roll(corners, -1, axis=1) - corners
+    for axis, other in ((0, 1), (1, 0)):
+        for limit in (low[axis], high[axis]):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                share = (limit - start[..., axis]) / side[..., axis]
+                across = start[..., other] + share * side[..., other]
+                height = start[..., 2] + share * side[..., 2]
+            meets = (share >= 0.0) & (share <= 1.0) & (across >= low[other]) & (across <= high[other])
+            found += height[meets].tolist()
+    normal = np.cross(side[:, 0], side[:, 1])
+    for corner in ((low[0], low[1]), (low[0], high[1]), (high[0], low[1]), (high[0], high[1])):
+        off = np.array(corner) - start[..., :2]
+        turn = side[..., 0] * off[..., 1] - side[..., 1] * off[..., 0]
+        inside = (np.all(turn >= 0.0, axis=1) | np.all(turn <= 0.0, axis=1)) & (np.abs(normal[:, 2]) > 0.0)
+        found += (
+            start[inside, 0, 2] - np.sum(normal[inside, :2] * off[inside, 0], axis=1) / normal[inside, 2]
+        ).tolist()
+    return max(found)
 
 
 def centred(item: SceneObject, vertices: Float, place: Sequence[float]) -> SceneObject:
@@ -68,7 +96,8 @@ def centred(item: SceneObject, vertices: Float, place: Sequence[float]) -> Scene
 
 
 def _at_height(item: SceneObject, vertices: Float, height: float) -> SceneObject:
-    matrix = item.T_world_object.matrix
+    """-inf: on the ground."""
+    matrix, height = item.T_world_object.matrix, height if np.isfinite(height) else 0.0
     return _moved(item, np.array([*matrix[:2, 3], height - float((vertices @ matrix[2, :3]).min())]))
 
 

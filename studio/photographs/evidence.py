@@ -161,6 +161,11 @@ class Evidence:
                     )
         return found
 
+    def _why(self, by_name: dict[str, float]) -> str:
+        """Why it is not the first of them."""
+        clearer = by_name[self.combination.name] < max(by_name.values())
+        return f"; {self.combination.name} is as clear as that, with less noise" if clearer else ""
+
     def told(self) -> list[tuple[str, str]]:
         """(what, choice and reason) for a person."""
         axis = self.axis
@@ -171,7 +176,7 @@ class Evidence:
         found = [
             ("scan axis", f"{axis} ({axis_reason})"),
             ("laser's colour", self.colour),
-            ("seen best in", f"{self.combination.name} ({reason})"),
+            ("looked for in", f"{self.combination.name} ({reason}{self._why(by_name)})"),
         ]
         if self.lines == 2:
             found.append(("lines", f"a second line stands out (evidence {self.score:.2f} and {self.second:.2f})"))

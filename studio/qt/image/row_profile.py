@@ -24,7 +24,7 @@ from studio.scan.stages import Measurement
 MARGIN_PX = 14.0
 """Shown on either side of the line, beside three times its width."""
 REASONS = {
-    Flag.NO_PEAK: "nothing above the noise",
+    Flag.NO_PEAK: "nothing as wide as a line stands out of noise and background",
     Flag.AT_BORDER: "cut by the border",
     Flag.TOO_FEW_PIXELS: "too few pixels",
     Flag.NOT_CONVERGED: "fit did not converge",
@@ -168,7 +168,7 @@ class RowProfile(QWidget):
             told.append(self._show_method(method, item, index, image, true))
             places += list(item.line.u[index][item.line.valid[index]])
         self._as_it_was = self.session.stale
-        before = ["<i>in the render as it was:</i>"] if self._as_it_was else []
+        before = ["<i>in the scene as it was rendered:</i>"] if self._as_it_was else []
         self.text.setText("   ".join([*before, *told]) if told else "no line here")
         if self.follow.isChecked():
             self._look_at(places, lines, index, values, image)
@@ -205,7 +205,7 @@ class RowProfile(QWidget):
         valid = np.flatnonzero(line.valid[index])
         if not len(valid):
             reason = REASONS.get(Flag(int(line.flag[index, 0])), "no position")
-            return f"<span style='color:{colour}'>{method_name(method)} finds no line: {reason}</span>"
+            return f"<span style='color:{colour}'>●</span> {method_name(method)} finds no line: {reason}"
         u, width = float(line.u[index, valid[0]]), float(line.width[index, valid[0]])
         if np.isfinite(width):
             x = np.linspace(u - 5 * width, u + 5 * width, 201)
@@ -217,7 +217,7 @@ class RowProfile(QWidget):
         # what is found and has no truth may be of a line all the same, as beside an edge
         error = f" {off + 0.0:+.3f} px" if len(true) else f" {u:.3f} px, no truth here to compare with"
         caution = CAUTIONS.get(Flag(int(line.flag[index, valid[0]])), "")
-        return f"<span style='color:{colour}'>{method_name(method)}{error}{caution and f', {caution}'}</span>"
+        return f"<span style='color:{colour}'>●</span> {method_name(method)}{error}{caution and f', {caution}'}"
 
     def _mark(self, position: float, colour: str, width: float, dashed: bool = False) -> None:
         style = pg.QtCore.Qt.PenStyle.DashLine if dashed else pg.QtCore.Qt.PenStyle.SolidLine

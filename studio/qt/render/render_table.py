@@ -228,7 +228,7 @@ class RenderTable(QDialog):
         table.setColumnCount(len(self.renders))
         table.setRowCount(len(self.rows))
         for k, render in enumerate(self.renders):
-            when = f"\n{read_out(render.created)}" if render.folder is not None else "\nthis session"
+            when = f"\nkept {read_out(render.created)}" if render.folder is not None else "\nthis session"
             small = scale_name(render.image_scale)
             head = QTableWidgetItem(render.name + when + (f"\n{small}" if small else ""))
             head.setToolTip("\n".join(scale_notes(render.image_scale)))

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QMenu, QSizePolicy, QVBoxLayo
 
 from render.base.arrays import Float
 from render.base.errors import InputError
+from render.base.pose import transform_points
 from render.scene.motion import Turntable
 from render.scene.scene import SceneObject
 from render.scene.shape import UNITS, MeshFile
@@ -30,9 +31,11 @@ from studio.qt.scene import mesh_importer
 
 REPLACES = "Another mesh file in its place, shaded as an import of it is; pose, scale and material stay"
 SCALES = "Changes its size: it is scaled until it fills the camera's view, and put in the middle of that"
-ON_TOP = "Its lowest point as high as the top of what is below or around it, by their boxes"
+ON_TOP = "Its lowest point as high as the highest place of other objects below or around it, seen from above"
 CENTRE = "The middle of its box over the turntable's axis point, or the origin where nothing turns; its height stays"
 
+LEAST_MOVE = 1e-3
+"""mm; less is rounding."""
 LINES = 3
 """For which there is room below the buttons."""
 
@@ -147,8 +150,11 @@ class MeshBar(QWidget):
             return
         look = live(self.session).look
         others = [one for one in look.placed if _size(look.scene.visible_objects[one.index]) != _size(item)]
-        boxes = [(one.body.bounds, one.T_world_object) for one in others]
-        if self._place("put on top", lambda item, vertices: mesh_placing.on_top(item, vertices, boxes)):
+        triangles = [
+            transform_points(one.T_world_object, one.body.surface.vertices)[one.body.surface.triangles]
+            for one in others
+        ]
+        if self._place("put on top", lambda item, vertices: mesh_placing.on_top(item, vertices, triangles)):
             self._tell_move(item, "its lowest point to the top of what is below it, or to the ground", "on top")
 
     def _put_in_the_middle(self) -> None:
@@ -164,9 +170,9 @@ class MeshBar(QWidget):
     def _tell_move(self, before: SceneObject, where: str, already: str) -> None:
         now = selected_mesh(self.session) or before
         by = np.subtract(now.T_world_object.translation, before.T_world_object.translation)
-        far = 1e3 * float(np.linalg.norm(by))
+        far = 1e3 * float(np.linalg.norm(by))  # mm
         moved = f"{now.name} moved {far:.4g} mm, {where}; Ctrl+Z takes it back"
-        self.session.message.emit("info", moved if far > 0.0 else f"{now.name} stood {already} already")
+        self.session.message.emit("info", moved if far >= LEAST_MOVE else f"{now.name} stood {already} already")
 
     def _place(self, label: str, change: Callable[[SceneObject, Float], SceneObject]) -> bool:
         """False: it cannot be done, which is told where there is something to tell."""
@@ -260,3 +266,8 @@ def take_mesh(session: Session, path: FieldPath, mesh: ImportedMesh) -> None:
         session.message.emit("error", "the object whose mesh was to be replaced is no longer there")
         return
     session.document.apply(f"use {Path(mesh.path).name}", project)
+    now = value_at(project, path)
+    if now.scale != 1.0:
+        size = " x ".join(f"{1e3 * now.scale * side:.4g}" for side in mesh.size)
+        told = f"The scale of {now.name}, {now.scale:g}, stays, and makes {size} mm of {Path(mesh.path).name}"
+        session.message.emit("warning", f"{told}: Scale to fit or the field Scale changes it")

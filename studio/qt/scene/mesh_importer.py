@@ -98,14 +98,14 @@ def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Ta
     def done(meshes: list[ImportedMesh]) -> None:
         if session.document is not document:
             return  # another project was opened meanwhile
-        if take is None:
-            _add(session, meshes)
-        elif len(meshes) == 1:
-            take(meshes[0])
-        else:
+        if take is not None and len(meshes) > 1:
             session.message.emit("error", f"an assembly of {len(meshes)} parts is not one mesh; import it instead")
             return
         session.message.emit("info", _told(meshes, chord, wanted))
+        if take is None:
+            _add(session, meshes)
+        else:
+            take(meshes[0])
 
     def failed(file: Path, error: BaseException) -> None:
         what = trouble(error, f"import {file.name}")

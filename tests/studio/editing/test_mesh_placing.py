@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 from render.base.arrays import Float
 from render.base.pose import Pose, transform_points
@@ -15,6 +16,7 @@ from studio.editing.mesh_placing import (
     UpAxis,
     centred,
     fitted,
+    highest_within,
     meeting,
     on_ground,
     on_its_foot,
@@ -95,10 +97,30 @@ def test_what_stands_on_the_ground_still_stands_there_when_it_is_fitted(vertices
 def test_on_top_of_what_is_below_it_seen_from_above(vertices: Float) -> None:
     places = in_world(ITEM, vertices)
     middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
-    below = np.array([[-0.01, -0.01, 0.0], [0.01, 0.01, 0.03]])
-    here, elsewhere = (Pose(translation=(x, middle[1], 0.2)).matrix for x in (middle[0], middle[0] + 5.0))
-    assert in_world(on_top(ITEM, vertices, [(below, here)]), vertices)[:, 2].min() == pytest.approx(0.23, abs=NANOMETRE)
-    assert on_top(ITEM, vertices, [(below, elsewhere)]) == on_ground(ITEM, vertices)
+    box = np.asarray(trimesh.creation.box(extents=(0.02, 0.02, 0.03)).triangles)
+    here, elsewhere = (box + np.array([x, middle[1], 0.2]) for x in (middle[0], middle[0] + 5.0))
+    assert in_world(on_top(ITEM, vertices, [here]), vertices)[:, 2].min() == pytest.approx(0.215, abs=NANOMETRE)
+    assert on_top(ITEM, vertices, [elsewhere]) == on_top(ITEM, vertices, []) == on_ground(ITEM, vertices)
+
+
+def test_the_highest_place_of_triangles_above_a_rectangle_is_that_of_many_rays() -> None:
+    """A tilted plane is lower below a part than where it ends."""
+    random = np.random.default_rng(7)
+    for _ in range(20):
+        triangles = random.uniform(-1.0, 1.0, (6, 3, 3))
+        low = random.uniform(-0.6, 0.1, 2)
+        high = low + random.uniform(0.1, 0.5, 2)
+        x, y = (one.ravel() for one in np.meshgrid(*np.linspace(low, high, 300).T))
+        rays = np.column_stack([x, y])
+        heights = [-np.inf]
+        for corners in triangles:
+            a, b, c = corners
+            inverse = np.linalg.inv(np.column_stack([b - a, c - a])[:2])
+            u, v = inverse @ (rays - a[:2]).T
+            z = a[2] + u * (b - a)[2] + v * (c - a)[2]
+            heights += z[(u >= 0.0) & (v >= 0.0) & (u + v <= 1.0)].tolist()
+        found = highest_within(triangles, low, high)
+        assert found == pytest.approx(max(heights), abs=0.03) and found >= max(heights) - 1e-9
 
 
 def test_centred_over_a_place_at_its_own_height(vertices: Float) -> None:

@@ -168,7 +168,8 @@ class TestKinds:
         qtbot.mouseClick(bar.fit, Qt.MouseButton.LeftButton)
         assert not isinstance(QApplication.focusWidget(), QLineEdit), "no key is typed into the next field"
         by = session.project.scene.objects[1].scale / before.scale
-        expected = f"{before.name} is scaled by {by:.3g}: 100 mm became {100 * by:.4g} mm; Ctrl+Z takes it back"
+        sizes = f"100 mm became {100 * by:.4g} mm; it still stands on the ground"
+        expected = f"{before.name} is scaled by {by:.3g}: {sizes}; Ctrl+Z takes it back"
         assert by != 1.0 and told == [("info", expected)]
         assert bar.fit.text() == "Scale to fit" and "Changes its size" in bar.fit.toolTip()
         session.document.undo()

@@ -91,6 +91,13 @@ def test_a_file_takes_the_place_of_any_object_s_shape(
     qtbot.waitUntil(lambda: isinstance(session.project.scene.objects[0].shape, MeshFile), timeout=10_000)
     after = session.project.scene.objects[0]
     assert (after.T_world_object, after.material) == (before.T_world_object, before.material)
+    # of a part that was scaled the file has another size than is said of it
+    told: list[tuple[str, str]] = []
+    session.message.connect(lambda level, text: told.append((level, text)))
+    session.set((*OBJECTS, 0, "scale"), 0.5)
+    replace_mesh(session, inspector)
+    qtbot.waitUntil(lambda: any(level == "warning" for level, _ in told), timeout=10_000)
+    assert "0.5, stays, and makes 20 x 15 x 10 mm of block.stl" in told[-1][1]
 
 
 def test_where_no_object_is_selected_it_says_what_to_do(session: Session, inspector: Inspector) -> None:
