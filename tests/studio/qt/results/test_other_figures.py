@@ -238,6 +238,6 @@ def test_the_profile_of_a_render_says_that_the_scene_has_changed(camera: CameraV
     session = camera.session
     assert "as it was" not in camera.profile.text.text()
     session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.5)
-    assert "in the render as it was" in camera.profile.text.text()
+    assert "in the scene as it was rendered" in camera.profile.text.text()
     session.document.undo()
     assert "as it was" not in camera.profile.text.text()
