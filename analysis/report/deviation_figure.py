@@ -73,13 +73,12 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
 
     across, up = _axes(what.towards)
     place = 1e3 * np.column_stack([what.points @ across, what.points @ up])
-    near = ~far_off(what.value)
-    part = place[near] if near.any() else place  # points far off would make a speck of it
-    place -= part.min(axis=0) if len(part) else 0.0
+    low, high = _extent(place, what.value)
+    place -= low
     edges = levels(what.value, what.lower, what.upper)
     bands = EVEN_BANDS if what.lower is None or what.upper is None else BANDS
     colours, norm = ListedColormap(list(bands)), BoundaryNorm(edges * 1e6, len(bands))
-    wide, tall = np.ptp(part, axis=0) if len(part) else (1.0, 1.0)
+    wide, tall = high - low
     if tall > wide:  # lying down it is larger on a page that is wider than this is high
         place, wide, tall = np.column_stack([place[:, 1], wide - place[:, 0]]), tall, wide
     height = float(np.clip(4.6 * max(tall, 0.36 * wide) / max(wide, 1e-9), 2.2, 5.6)) + 0.5
@@ -93,10 +92,9 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         # room for the callouts about a map that is low
         pad = 0.5 * max(0.36 * wide - tall, 0.1 * tall)
         drawing.set_ylim(-pad, tall + pad)
-        drawing.set_xlim(-MARGIN * wide, (1.0 + MARGIN) * wide)
-        beyond = int(
-            np.any((place < (-MARGIN * wide, -pad)) | (place > ((1.0 + MARGIN) * wide, tall + pad)), axis=1).sum()
-        )
+        margin = MARGIN * max(wide, 1.0)  # mm, of a single point as well
+        drawing.set_xlim(-margin, wide + margin)
+        beyond = int(np.any((place < (-margin, -pad)) | (place > (wide + margin, tall + pad)), axis=1).sum())
         drawing.grid(False)
         drawing.set(xlabel="mm", ylabel="mm")
         drawing.xaxis.set_major_locator(MaxNLocator(max(1, min(8, round(8.0 * wide / max(tall, 1e-9)))), integer=True))
@@ -127,6 +125,19 @@ def _without_number(stray: int, count: int, beyond: int) -> str:
     if count == 0:
         return left
     return f", {count} stray {'or unsure ' * (count > stray)}point{' has' if count == 1 else 's have'} none{left}"
+
+
+def _extent(place: Float, value: Float) -> tuple[Float, Float]:
+    """(2,) and (2,): where the part begins and ends, of which a few points far off would make a speck.
+
+    More of them than may be false are a place of the part, such as an end that is bent away.
+    """
+    if len(place) == 0:
+        return np.zeros(2), np.ones(2)
+    near = ~far_off(value)
+    part = place[near] if near.any() else place
+    low, high = np.quantile(place, [FALSE, 1.0 - FALSE], axis=0)
+    return np.minimum(part.min(axis=0), low), np.maximum(part.max(axis=0), high)
 
 
 def _of_the_part(what: DeviationMap, place: Float) -> tuple[NDArray[np.int64], float, int]:

@@ -43,8 +43,8 @@ def reconstruct_folder(
     """Develop, extract and triangulate the frames of a scan anew; `project` may have another sensor or extraction.
 
     Writes points and, where requested, the report into `out`. logo_folder: where the report's logo is looked for, if
-    not where the meshes are. InputError: frames missing or damaged, `project` differs
-    in what the frames fix, or as `scan_folder.measuring`.
+    not where the meshes are. InputError: frames missing or damaged, `project` differs in what the frames fix, or as
+    `scan_folder.measuring`.
     """
     scan_folder.check_kept(found)
     scan_folder.check_measures(found, project)

@@ -65,6 +65,17 @@ def test_points_far_off_leave_the_part_as_large_as_it_is_and_are_counted() -> No
     assert made.axes[0].get_title(loc="left").endswith("2 stray points have none,\n2 lie beyond the picture")
 
 
+def test_an_end_of_the_part_that_is_bent_away_is_in_the_picture() -> None:
+    """It is far off by its value, and a place of the part by its neighbours."""
+    x, y = (one.ravel() for one in np.meshgrid(np.linspace(0.0, 0.1, 100), np.linspace(0.0, 0.03, 40)))
+    value = 5e-6 * np.random.default_rng(4).standard_normal(len(x))
+    value[x > 0.08] = -3e-4
+    made = draw(DeviationMap(np.column_stack([x, y, value]), value, UP, -5e-5, 5e-5))
+    left, right = made.axes[0].get_xlim()
+    assert left < 0.0 and 100.0 < right < 110.0
+    assert "beyond" not in made.axes[0].get_title(loc="left")
+
+
 @pytest.mark.parametrize("kind", ["alone on their scan lines", "much less sure than most"])
 def test_stray_points_beside_the_part_have_no_number_and_a_dent_beside_them_has(kind: str) -> None:
     """ "1: -3250 µm" stood in the report of a part against itself, over points that its last profile only grazes."""

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from studio.project.document import Document
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.image.camera_view import CameraView
 from studio.qt.render.motion_panel import MotionPanel
@@ -16,30 +14,6 @@ from studio.qt.results.heads import GROWING
 from studio.qt.shell.window import MainWindow
 from studio.scan.scan_folder import open_folder
 from tests.studio.qt.core.scan_hands import results_of, shown
-from tests.studio.scan_of_steps import small_project, small_scan
-
-
-@pytest.fixture(scope="module")
-def scanned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    return small_scan(tmp_path_factory.mktemp("scan"))
-
-
-@pytest.fixture
-def opened(window: MainWindow, scanned: tuple[Path, Path], qtbot: QtBot) -> MainWindow:
-    assert window.files.open(scanned[1])
-    shown(window, qtbot, 0)
-    return window
-
-
-@pytest.fixture
-def moving(window: MainWindow, tmp_path: Path) -> MotionPanel:
-    file = tmp_path / "moving" / "steps.json"
-    window.files.replace(Document(small_project().save(file), file))
-    panel = window.panels["motion"]
-    assert isinstance(panel, MotionPanel)
-    panel.scale.setCurrentText("half size")
-    window.show_panel("motion")
-    return panel
 
 
 def test_it_plays_its_own_frames_as_fast_as_they_are_measured(opened: MainWindow, qtbot: QtBot) -> None:

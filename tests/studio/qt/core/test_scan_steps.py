@@ -27,24 +27,12 @@ from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan_folder import image_scale_of, open_folder
 from tests.studio.qt.core.scan_hands import results_of, shown
 from tests.studio.qt.shell.window_hands import answer
-from tests.studio.scan_of_steps import SCALE, small_project, small_scan
-
-
-@pytest.fixture(scope="module")
-def scanned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    return small_scan(tmp_path_factory.mktemp("scan"))
+from tests.studio.scan_of_steps import SCALE
 
 
 def cell(panel: ResultsPanel, row: str, column: int = 0) -> float:
     rows = {panel.table.verticalHeaderItem(i).text(): i for i in range(panel.table.rowCount())}
     return float(panel.table.item(rows[row], column).text())
-
-
-@pytest.fixture
-def opened(window: MainWindow, scanned: tuple[Path, Path], qtbot: QtBot) -> MainWindow:
-    assert window.files.open(scanned[1])
-    shown(window, qtbot, 0)
-    return window
 
 
 class TestOpened:
@@ -219,16 +207,6 @@ def test_the_command_line_opens_them(qtbot: QtBot, scanned: tuple[Path, Path], m
 
 
 class TestRun:
-    @pytest.fixture
-    def moving(self, window: MainWindow, tmp_path: Path) -> MotionPanel:
-        file = tmp_path / "moving" / "steps.json"
-        window.files.replace(Document(small_project().save(file), file))
-        panel = window.panels["motion"]
-        assert isinstance(panel, MotionPanel)
-        panel.scale.setCurrentText("half size")
-        window.show_panel("motion")
-        return panel
-
     def test_its_results_reach_measure(
         self, moving: MotionPanel, window: MainWindow, qtbot: QtBot, tmp_path: Path
     ) -> None:
