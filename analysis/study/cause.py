@@ -14,6 +14,9 @@ COARSER = 1.5
 by the calibration has, whose boards then tell too little."""
 WIDER = 1.5
 """A line so many times as wide as before is out of focus, or too wide."""
+NARROWER, NARROW = 1.5, 1.0
+"""Times as narrow as before, and then how many pixels (sigma), where a line is too thin for the pixels: its place locks
+to their grid."""
 DIMMER = 2.0
 BRIGHTER, KEPT = 4.0, 0.5
 """Times that the light beneath a line has grown, and grown more than the line itself, where other light drowns it, and
@@ -27,8 +30,8 @@ def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
     Each symptom is the fraction of rows that it takes, more than before; the largest names the cause. A surface seen or
     lit at grazing angles loses its rows to that, whatever their symptom, unless they are hidden. Where no row is lost,
     depth may be coarse though the line is exact; else the line itself says why it is measured worse: what lies beneath
-    it is brighter, or it is wider, which also loses rows or tears the peak, or dimmer. A measure that is not known has
-    not changed.
+    it is brighter, or it is wider, which also loses rows or tears the peak, or dimmer, or thinner than the pixels. A
+    measure that is not known has not changed.
     """
     symptoms = {
         "occluded": _less(good, bad, "visible_rows"),
@@ -59,6 +62,9 @@ def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
         return "out of focus or too wide"
     if worst != "wrong peak" and _times(bad, good, "signal") > DIMMER:
         return "starved"
+    narrower = _times(bad, good, "line_width") > NARROWER and bad.get("line_width", NARROW) < NARROW
+    if worst in ("less precise", "not measurable") and narrower:
+        return "too thin for the pixels"
     return worst
 
 

@@ -20,6 +20,7 @@ from studio.study.as_begun import begun_in
 from studio.study.begin import begin
 from studio.study.cells import Shard, next_cells
 from studio.study.labels import as_read
+from studio.study.one_phase import one_phase_doubts
 from studio.study.runner import run_study
 from studio.study.store import Store, described
 from studio.study.study import SEARCHES, Study, ready_made
@@ -62,6 +63,8 @@ def run_into(
             more = f", and what {searches} search(es) will ask for" if searches else ""
             there = f"; {known} are there already" if known else ""
             print(f"{len(first)} cells of {renders} renders{more}{there}", file=sys.stderr)
+            for doubt in one_phase_doubts(study, bases):
+                print(f"note: {doubt}", file=sys.stderr)
         threading.Thread(target=_import_page, name="import of charts").start()  # while the workers start and work
         with stage_progress(quiet) as progress, stop_on_interrupt(never) as cancelled:
             try:

@@ -13,6 +13,7 @@ from analysis.study.breakdown import EXTRA
 from studio.project.project import Project
 from studio.study.begin import study_bytes
 from studio.study.cells import Cell, Point, cells_at, check_size, lattice_of, light_key, methods_of, next_cells, points
+from studio.study.one_phase import one_phase_doubts
 from studio.study.small_images import small_image_doubts
 from studio.study.store import Row
 from studio.study.study import SEARCHES, Study
@@ -83,7 +84,12 @@ def estimate(
     size = study_bytes(study, len(rows) + cells + searched)
     steps = max(base.scene.frame_count for base in bases.values())
     known = None if math.isnan(seconds) else seconds
-    doubts = (*small_image_doubts(study, bases), *_not_shared(missing), *_noise_apart(study, missing))
+    doubts = (
+        *small_image_doubts(study, bases),
+        *one_phase_doubts(study, bases),
+        *_not_shared(missing),
+        *_noise_apart(study, missing),
+    )
     return Estimate(cells, renders, searched, known, size, steps, doubts, _left_over(study, bases, rows))
 
 

@@ -13,6 +13,7 @@ from analysis.report.style import png_uri
 from render.base.csv_file import write_csv
 from render.base.files import atomic_write
 from studio.project.project import Project
+from studio.project.templates import DESCRIPTIONS
 from studio.study.answers import Answer, Broken, answers
 from studio.study.boundary_table import edge_rows, edge_sentences, write_edges
 from studio.study.bounds import Bound
@@ -21,9 +22,11 @@ from studio.study.charts import chart, field_label, shown
 from studio.study.kept import KEPT
 from studio.study.labels import as_read, interval_text, number_text
 from studio.study.measures import measure_of
+from studio.study.one_phase import one_phase_doubts
 from studio.study.references import HEADER as BESIDE_HEADER
 from studio.study.references import Beside, beside, write_references
 from studio.study.references import page_rows as page_rows_beside
+from studio.study.small_images import small_image_doubts
 from studio.study.store import Row
 from studio.study.study import Study, Sweep, told_laser
 
@@ -70,12 +73,18 @@ def write_page(
         "parts": parts,
         "cells": len(rows),
         "repeats": study.repeats,
-        "bases": " · ".join([", ".join(sorted(bases)), *told_laser(study, bases)]),
+        "bases": " · ".join([", ".join(_called(bases)), *told_laser(study, bases)]),
+        "doubts": (*small_image_doubts(study, bases), *one_phase_doubts(study, bases)),
     }
     page = page_of(Path(__file__).parent / "page.html", content)
     with atomic_write(folder / "study.html") as temporary:
         temporary.write_text(page, encoding="utf-8")
     return folder / "study.html", found
+
+
+def _called(bases: Mapping[str, Project]) -> list[str]:
+    """Templates by their names, projects beside the study by their own."""
+    return sorted(name if name in DESCRIPTIONS else base.name for name, base in bases.items())
 
 
 def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:

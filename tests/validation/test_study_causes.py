@@ -30,6 +30,7 @@ MEASURES = {
     "wrong peak": FEWER,
     "occluded": ("visible_rows",),
     "out of focus or too wide": WORSE,
+    "too thin for the pixels": ("position_rmse",),
     "grazing": WORSE,
     "degenerate": ("depth_rmse",),
 }

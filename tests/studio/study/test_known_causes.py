@@ -59,6 +59,11 @@ def out_of_focus(look: Look, value: float) -> Look:
     return replace(look, peak=look.peak / value, width=look.width * value)
 
 
+def thin(look: Look, value: float) -> Look:
+    """As bright a line, which so has less light: it must break by the grid of the pixels before it does by that."""
+    return replace(look, width=look.width * value)
+
+
 def grazing(look: Look, value: float) -> Look:
     """The same light on more of the surface, which the camera sees from above."""
     more = math.cos(look.angle) / math.cos(value)
@@ -77,6 +82,7 @@ SEARCHES = {
     "wrong peak": (lambda look, value: replace(look, ghosts=value), 0.0, 0.9, ("completeness", 0.8, False), False),
     "occluded": (lambda look, value: replace(look, hidden=value), 0.0, 0.9, ("visible_rows", 0.7, False), False),
     "out of focus or too wide": (out_of_focus, 1.0, 20.0, ("position_rmse", 0.15, True), True),
+    "too thin for the pixels": (thin, 1.0, 0.05, ("position_rmse", 0.1, True), True),
     "grazing": (grazing, 0.2, 1.55, ("position_rmse", 0.15, True), False),
     "degenerate": (lambda look, value: replace(look, baseline=value), 0.2, 0.002, ("depth_rmse", 2e-3, True), True),
 }
