@@ -25,6 +25,8 @@ from studio.study.effects import STATES
 from studio.study.measures import MEASURES, measure_of, part_names
 
 FOLDER = Path(__file__).resolve().parents[2] / "assets" / "studies"
+BASES = FOLDER / "bases"
+"""Projects of ready-made studies that are no templates."""
 MOST_VALUES, MOST_CELLS, MOST_VARIED, MOST_SWEEPS = 10_000, 1_000_000, 8, 100
 Value = bool | int | float | str | None
 SEARCHES = ("bisection", "boundary")
@@ -191,7 +193,9 @@ class Study(Model):
     schema_version: Literal[1] = 1
     name: str = quantity("study", label="Name", min_length=1, max_length=100)
     question: str = quantity("", label="Question", max_length=500)
-    base: str = quantity(label="Base project", help="A template's name, or a path beside the study file.")
+    base: str = quantity(
+        label="Base project", help="A template's name, a ready-made study's own base, or a path beside the study file."
+    )
     image_scale: float = quantity(1.0, label="Image scale", ge=0.01, le=4.0)
     laser: int = quantity(0, label="Laser", help="Index of the laser that is measured.", ge=0, le=63)
     methods: tuple[Method, ...] = ("likelihood",)
@@ -257,13 +261,18 @@ def ready_made() -> list[str]:
     return names_in(FOLDER)
 
 
+def named_bases() -> tuple[str, ...]:
+    """Base projects that come with the program, by their names: templates, and those of ready-made studies."""
+    return (*DESCRIPTIONS, *names_in(BASES))
+
+
 def base_project(name: str, root: Path) -> Project:
-    """A template by its name, or a project beside the study file. InputError: neither."""
-    if name in DESCRIPTIONS:
-        return Project.load(template_folder(name))
+    """One of `named_bases`, or a project beside the study file. InputError: neither."""
+    if name in named_bases():
+        return Project.load(template_folder(name) if name in DESCRIPTIONS else BASES / f"{name}.json")
     path = inside(root, name, "base")
     if not path.exists():
-        allowed = f"a project file beside the study, or a template: {', '.join(DESCRIPTIONS)}"
+        allowed = f"a project file beside the study, or one of: {', '.join(named_bases())}"
         raise InputError("there is no such base project", where="base", found=name, allowed=allowed)
     return Project.load(path)
 

@@ -12,7 +12,7 @@ from studio.project.project import Project
 from studio.project.project_files import check_no_project
 from studio.project.strict_json import pretty
 from studio.project.templates import DESCRIPTIONS, FOLDER
-from studio.study.study import Study, base_project
+from studio.study.study import Study, base_project, named_bases
 
 
 def base_name(document: Document) -> str:
@@ -38,7 +38,7 @@ def _base_from(folder: Path, base: str, document: Document, loaded: Mapping[str,
     InputError: no path leads there.
     """
     own = loaded.get(base, document.project)
-    if base in DESCRIPTIONS and own == base_project(base, folder):
+    if base in named_bases() and own == base_project(base, folder):
         return base
     path = document.path
     cure = "save the project, then the study beside it or in a folder above"

@@ -15,7 +15,7 @@ from studio.qt.render.develop_panel import DevelopPanel
 from studio.scan.folder_lock import hold
 from studio.study.draft import VALUES
 from studio.study.store import FILE
-from studio.study.study import ready_made
+from studio.study.study import Study, ready_made
 from tests.studio.qt.study.desk import NOISE, POWER, Desk, run
 
 
@@ -165,9 +165,16 @@ class TestDraft:
         desk.work.load("quick")
         assert desk.panel.sweeps.count() == 6 and desk.work.project().name != ""
         qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.cells > 600)
-        assert set(desk.work.loaded) == {"plane", "shiny_weld_seam"}
+        assert set(desk.work.loaded) == {"dark_plate", "shiny_weld_seam"}
         desk.work.use_open_project()
         assert desk.work.draft["base"] == "plane.json" and desk.work.project() is desk.session.project
+
+    def test_a_ready_made_study_is_saved_elsewhere_with_changes_of_ones_own(self, desk: Desk, tmp_path: Path) -> None:
+        desk.work.load("quick")
+        desk.work.change(lambda draft: draft.update(repeats=3))
+        assert desk.work.save(tmp_path / "mine.json"), desk.work.problem
+        mine, root = Study.load(tmp_path / "mine.json")
+        assert mine.repeats == 3 and mine.bases(root) == desk.work.loaded
 
     def test_a_saved_study_asks_the_same(self, qtbot: QtBot, desk: Desk, tmp_path: Path) -> None:
         desk.small([2.0, 20.0])
