@@ -114,14 +114,16 @@ def verdict_of(row: Mapping[str, Any]) -> str:
     steps, counts = row["readings"], row.get("verdicts") or {}
     if row["reason"]:
         return f"not measured in any of {steps} steps" if steps > 1 else "not measured"
-    told = marked_verdict(row)
-    if steps <= 1 or not set(counts) - {"no tolerance"}:
+    if steps <= 1:
+        return marked_verdict(row)
+    told = MARKS[row["verdict"]] if row["verdict"] else NONE
+    if not set(counts) - {"no tolerance"}:
         return told
     return counts_text(counts) if told == NONE else f"{told}: {counts_text(counts)}"
 
 
 def worst_of(row: Mapping[str, Any]) -> str:
-    """Which of its steps such an entry has its value of; empty: there is one step, or no value."""
+    """Which of its steps such an entry has its value of, and what is amiss there; empty: one step, or no value."""
     if row["reason"] or row["readings"] <= 1:
         return ""
     some = "none" in (row.get("verdicts") or {})
@@ -129,7 +131,8 @@ def worst_of(row: Mapping[str, Any]) -> str:
         what = "worst measured" if some else "worst"
     else:
         what = f"farthest off the {'truth' if row['nominal'] is None else 'nominal'}{' of those measured' * some}"
-    return f"{what}: step {row['step'] + 1} of {row['readings']}"
+    amiss = verdict_text(None, row.get("oblique"), row.get("remark") or "")
+    return f"{what}: step {row['step'] + 1} of {row['readings']}{f' ({amiss})' if amiss != NONE else ''}"
 
 
 def over_steps_of(row: Mapping[str, Any]) -> str:
@@ -151,9 +154,11 @@ def marked_verdict(row: Mapping[str, Any]) -> str:
 
 
 def remark_of(row: Mapping[str, Any]) -> str:
-    """Of such an entry, with why a misfit is undecided whatever its value is."""
+    """Of such an entry, with the step that it is of and why a misfit is undecided whatever its value is."""
     remark = str(row.get("remark") or "")
-    return f"{remark}; {UNPROVED}" if MISSES in remark and row["verdict"] == "undecided" else remark
+    if MISSES in remark and row["verdict"] == "undecided":
+        remark = f"{remark}; {UNPROVED}"
+    return f"in step {row['step'] + 1}, whose value this is, {remark}" if remark and row["readings"] > 1 else remark
 
 
 def label_of(one: Reading, step: str = "") -> str:

@@ -76,11 +76,10 @@ def tiles(found: Total) -> list[tuple[str, str, str]]:
         return []
     depth, of_sample = found.depth_z, " (sample)" if found.sampled else ""
     if ruled(found):
-        few = counted(found.outliers, "outlier") if found.outliers else "its largest errors"
         spread = [
-            ("Depth robust sigma", micrometres(depth.robust_sigma), f"without {few}{of_sample}"),
+            ("Depth robust sigma", micrometres(depth.robust_sigma), f"of what most points err by{of_sample}"),
             ("Depth median", micrometres(depth.median, 2), f"+ is too far; mean {micrometres(depth.bias, 2)}"),
-            ("Depth RMSE", micrometres(depth.rmse), f"ruled by {few}"),
+            ("Depth RMSE", micrometres(depth.rmse), f"half of its square by {counted(found.half_by, 'point')}"),
         ]
     else:
         spread = [
@@ -163,16 +162,16 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
     if found.u.outlier_rate > 0.002:
         said.append(
             f"{percent(found.u.outlier_rate)} of the points are outliers in the image, {WRONG}: a wrong peak, "
-            "or an edge. "
-            f"{'They dominate the RMSE; t' if dominated else 'T'}he robust sigma leaves them out."
+            "or an edge. The robust sigma leaves them out."
         )
     elif found.outliers and dominated:
         few = "1 point is an outlier" if found.outliers == 1 else f"{count(found.outliers)} points are outliers"
-        them = "it" if found.outliers == 1 else "them"
+        said.append(f"{few}, {WRONG}.")
+    if dominated:
         said.append(
-            f"{few}, {WRONG}. Of {count(found.points)} points that is few, but the RMSE of "
-            f"{micrometres(found.depth_z.rmse)} is mostly of {them}; the robust sigma, which leaves {them} out, is "
-            f"{micrometres(found.depth_z.robust_sigma)}."
+            f"Half of the square of the RMSE of {micrometres(found.depth_z.rmse)} is of {count(found.half_by)} of "
+            f"{counted(found.points, 'point')}, those with the largest errors, as at edges or of wrong peaks; most err "
+            f"by {micrometres(found.depth_z.robust_sigma)} (robust sigma)."
         )
     off, allowed = abs(found.depth_z.median), SURELY * np.hypot(found.calibration, found.depth_z.robust_sigma)
     if found.calibration > 0.0 and off > allowed:

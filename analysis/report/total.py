@@ -63,6 +63,8 @@ class Total:
     """Fraction of the points that are saturated."""
     sheet_bias: tuple[float, float] = (0.0, 0.0)
     """RMS and 95th percentile, px, of the bias of the positions by the sheet's width; 0: not known."""
+    half_by: int = 0
+    """Number of points, those with the largest errors in depth, that make half of the sum of its squares."""
     calibration: float = 0.0
     """m, median standard deviation of `depth_z` by the calibration; 0: it is taken as exact."""
 
@@ -108,12 +110,18 @@ def total(chosen: Chosen) -> Total:
         narrow=_share(rows["width"][np.isfinite(rows["width"])] < NARROW_PX),
         saturated=_share(rows["flag"] == Flag.SATURATED),
         sheet_bias=_sheet_bias(rows["sheet_bias"]),
+        half_by=round(_half_by(rows["depth"]) * chosen.lines / max(chosen.lines_kept, 1)),
         calibration=_median(rows["sigma_systematic"]),
     )
 
 
 def _share(there: NDArray[np.bool_]) -> float:
     return float(np.mean(there)) if len(there) else 0.0
+
+
+def _half_by(errors: Float) -> int:
+    squares = np.sort(errors[np.isfinite(errors)] ** 2)[::-1].cumsum()
+    return int(np.searchsorted(squares, 0.5 * squares[-1])) + 1 if len(squares) else 0
 
 
 def _median(values: Float) -> float:

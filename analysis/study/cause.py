@@ -18,10 +18,10 @@ NARROWER, NARROW = 1.5, 1.0
 """Times as narrow as before, and then how many pixels (sigma), where a line is too thin for the pixels: its place locks
 to their grid."""
 DIMMER = 2.0
-BRIGHTER, KEPT = 4.0, 0.5
-"""Times that the light beneath a line has grown, and grown more than the line itself, where other light drowns it, and
-the least that is then left of both together: a line that spreads beyond its window leaves light beneath it as well, but
-that is its own, and both together grow far fainter."""
+BRIGHTER, LEAST, KEPT = 4.0, 0.05, 0.5
+"""Times that the light beneath a line has grown, and grown more than the line itself, where other light drowns it, the
+share of the line that it is then at least, and the least that is then left of both together: a line that spreads beyond
+its window leaves light beneath it as well, but that is its own, and both together grow far fainter."""
 
 
 def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
@@ -50,7 +50,8 @@ def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
     if math.cos(good.get("incidence", 0.0)) > STEEPER * math.cos(bad.get("incidence", 0.0)):
         return "grazing"
     wider = _times(good, bad, "line_width") > WIDER
-    brighter = _times(good, bad, "background") > BRIGHTER * max(_times(good, bad, "signal"), 1.0)
+    beneath = bad.get("background", 0.0) > LEAST * bad.get("signal", 0.0)  # else the noise of what a fit takes for it
+    brighter = beneath and _times(good, bad, "background") > BRIGHTER * max(_times(good, bad, "signal"), 1.0)
     if worst != "saturated" and brighter and not wider and _both(bad) > KEPT * _both(good):
         return "too much other light"
     if worst in ("starved", "saturated"):

@@ -223,13 +223,18 @@ def move(project: Project, path: FieldPath, index: int) -> Result:
 
 
 def new_motion(project: Project, kind: type[BaseModel]) -> Motion:
-    """Of another kind; what both kinds have in common stays, and a new stage moves across the line."""
+    """Of another kind; what both kinds have in common stays.
+
+    A new stage moves across the line, and a new turntable goes round once.
+    """
     from studio.editing.forms import Alternative, start_value
 
     assert kind in (NoMotion, LinearStage, Turntable, PoseList)
     motion: Motion = start_value(Alternative("", "", kind), project.scene.motion)
     if isinstance(motion, LinearStage) and not isinstance(project.scene.motion, LinearStage):
         motion = motion.model_copy(update={"step": across_the_line(project.scene)})
+    if isinstance(motion, Turntable) and not isinstance(project.scene.motion, Turntable):
+        motion = motion.model_copy(update={"angle_step": min(2.0 * math.pi / motion.steps, math.pi)})
     return motion
 
 

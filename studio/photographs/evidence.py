@@ -49,6 +49,8 @@ WEAK = 0.5
 """Score of the other axis over that of the one chosen, above which the choice is doubtful."""
 FAINT = 0.02
 """Score below which no line stands out anywhere."""
+DOUBTFUL = 0.3
+"""Score below which what stands out may as well be an edge of the part: such a one had 0.23, lines 0.4 and more."""
 SECOND = 0.25
 """Score from which a second line, clearer of all else than the first is of it, is taken as well."""
 ENOUGH = 8
@@ -159,6 +161,11 @@ class Evidence:
                         f"the line may run along the {self.axis} instead (evidence {other:.2f} for --axis {axis}, "
                         f"{self.clearest[self.axis]:.2f} for {self.axis})"
                     )
+            if max(self.score, self.second) < DOUBTFUL:
+                found.append(
+                    f"what is taken for the line stands out weakly (evidence {self.score:.2f}): it may be an edge, or "
+                    "a reflection: see the overlay"
+                )
         return found
 
     def _why(self, by_name: dict[str, float]) -> str:

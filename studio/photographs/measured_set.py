@@ -13,6 +13,9 @@ from render.base.errors import InputError
 from studio.photographs.photograph_set import Look, Wishes, look_at
 from studio.photographs.photographs import Measured, extract_photograph
 
+THINNEST = 0.3
+"""px, sigma of the image of a line; a lens and a colour mosaic alone make it wider."""
+
 
 @dataclass(frozen=True)
 class MeasuredSet:
@@ -21,6 +24,14 @@ class MeasuredSet:
     look: Look
     lines: dict[Path, Measured] = field(default_factory=dict)
     problems: dict[Path, str] = field(default_factory=dict)
+
+    @property
+    def chosen(self) -> list[str]:
+        """What was chosen for all of them, and doubts; without what is said of lines where none is found."""
+        some = any(one.line.valid.any() for one in self.lines.values())
+        told = [f"{what}: {how}" for what, how in self.look.told if some or what != "lines"]
+        of_all = [f"Of all {len(self.look.offs)} photographs together:"] if len(self.look.offs) > 1 else []
+        return [*of_all, *told, *(f"warning: {text}" for text in self.look.warnings)]
 
     def told_of(self, path: Path) -> str:
         """One line of text on a photograph."""
@@ -34,6 +45,8 @@ class MeasuredSet:
         sigma = float(np.nanmedian(line.sigma_u[found, 0]))
         width = float(np.median(line.width[found, 0]))
         told = f"{found.sum()} of {count} {line.axis}, sigma {sigma:.3f} px, width {width:.2f} px"
+        if width < THINNEST:
+            told += ", thinner than a lens draws a line: is it an edge?"
         return f"{told}; {line.note}" if line.note else told
 
 

@@ -118,6 +118,15 @@ def finish(scan: Begun, result: dict[str, Any]) -> dict[str, Any]:
     return _write_manifest(scan.folder, manifest)
 
 
+def is_project(file: Path) -> bool:
+    """A project that is called as a scan's manifest is, as one of the template "Scan" may be."""
+    try:
+        found = read_object(file)
+    except InputError:
+        return False
+    return "format" not in found and "scene" in found
+
+
 def open_folder(folder: Path) -> ScanFolder:
     """Read a finished scan.
 

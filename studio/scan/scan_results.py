@@ -31,6 +31,7 @@ from studio.scan.scan_folder import (
     check_frame,
     check_kept,
     image_scale_of,
+    is_project,
     measured_project,
 )
 from studio.scan.stages import scaled, step_world
@@ -130,7 +131,10 @@ class ScanResults:
 def holds_scan(path: Path) -> Path | None:
     """The folder of a scan meant by a path: the folder, or a file of the scan itself; None: it is something else."""
     folder = path if path.is_dir() else path.parent if path.name in (MANIFEST, PROJECT) else None
-    return folder if folder is not None and ((folder / MANIFEST).is_file() or (folder / PROJECT).is_file()) else None
+    if folder is None or (path.name == MANIFEST and is_project(path)):
+        return None
+    finished = (folder / MANIFEST).is_file() and not is_project(folder / MANIFEST)
+    return folder if finished or (folder / PROJECT).is_file() else None
 
 
 def read_results(found: ScanFolder, cancelled: Cancel = never) -> ScanResults:

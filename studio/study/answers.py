@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.report.summary import LITTLE
 from analysis.study.breakdown import Breakdown, breakdown
 from analysis.study.budget import Budget, budget
 from analysis.study.cause import cause
@@ -100,6 +101,8 @@ class Answer:
     """Figures of others, and what is measured there."""
     image_scale: float = 1.0
     """At which the cells were measured."""
+    little: int = 0
+    """Spots at which less than half of the line is measured."""
 
 
 def answers(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> list[Answer]:
@@ -136,6 +139,7 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
         tuple(KeptCell(*at, row[KEPT_ROW]) for at, found in groups.items() for row in found if row.get(KEPT_ROW)),
         _beside(sweep, methods_of(study, sweep)[0], groups),
         study.image_scale,
+        sum(mean_interval(values_of(found, "completeness")).mean < LITTLE for found in groups.values()),
     )
 
 

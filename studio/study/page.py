@@ -10,6 +10,7 @@ from typing import Any
 from analysis.report.colour import method_name
 from analysis.report.page import page_of
 from analysis.report.style import png_uri
+from analysis.report.units import counted
 from render.base.csv_file import write_csv
 from render.base.files import atomic_write
 from studio.project.project import Project
@@ -93,6 +94,11 @@ def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:
     if answer.edges:
         said += edge_sentences(answer, _limit_words(answer.sweep))
     said += [_bound_sentence(one, answer, labels) for one in answer.bounds]
+    if answer.little and not answer.broken and answer.sweep.measure.startswith(("position_", "depth_")):
+        said.append(
+            f"At {answer.little} of {counted(len(answer.spots), 'point')} less than half of the line is measured: "
+            "errors there are of chance finds and wrong peaks, and say little of the scanner."
+        )
     front = answer.front
     if front is not None and front.knee is not None:
         spot = answer.spots[front.knee]

@@ -358,9 +358,7 @@ class PhotographWindow(QWidget):
         if self.found is None or path is None:
             return
         self.told.setText(self.found.told_of(path))
-        look = self.found.look
-        warnings = [f"warning: {text}" for text in look.warnings]
-        self.chosen.setText("\n".join([*(f"{what}: {how}" for what, how in look.told), *warnings]))
+        self.chosen.setText("\n".join(self.found.chosen))
         if measured is None:
             return
         pixels, index, rank = measured.line.pixels()

@@ -29,7 +29,7 @@ REASONS = {
     Flag.TOO_FEW_PIXELS: "too few pixels",
     Flag.NOT_CONVERGED: "fit did not converge",
     Flag.OUT_OF_WINDOW: "fit left its window",
-    Flag.TOO_WIDE: "too wide for a line",
+    Flag.TOO_WIDE: "what stands out most is too wide for a line",
     Flag.NO_PIXELS: "no usable pixel",
 }
 CAUTIONS = {

@@ -19,8 +19,8 @@ GROWING = (
 )
 CHANGED = "The scene has changed since: these are the figures of the render as it was."
 MEASURED_OTHERWISE = (
-    "Measure > Measure the scan again: figures of all steps are as they were measured, and sensor, extraction or "
-    "calibration has changed since."
+    "Measure > Measure the scan again: figures of all steps are as they were measured, and laser power, sensor, "
+    "extraction or calibration has changed since."
 )
 """The remedy first."""
 

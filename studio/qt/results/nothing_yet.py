@@ -16,8 +16,8 @@ from studio.scan.scan_beside import scan_beside
 from studio.scan.scan_folder import ScanFolder
 
 NOTHING = (
-    "Nothing is measured yet. Render the frame (F5), run a scan, or open the results of one: "
-    "line, points and errors appear here, those of a scan that runs when it has ended."
+    "No figures yet. Render the frame (F5), run a scan, or open the results of one: line, points and errors appear "
+    "here, those of a scan when it has run to its end. One that was stopped goes on by Render > Resume the scan."
 )
 LANE = "scan beside"
 

@@ -1,5 +1,5 @@
 """The Motion panel, which is of no workspace, where it is called for: by the scene tree, to run a scan or go on, and
-behind Design where the project moves."""
+behind Design where the project moves, as soon as it does."""
 
 from __future__ import annotations
 
@@ -17,10 +17,16 @@ BESIDE = "readout"
 
 
 def join_motion(
-    panels: Panels, commands: Actions, docks: dict[str, QDockWidget], call_panel: Callable[[str], None]
-) -> Callable[[str], None]:
-    """call_panel: brings a panel to the front by its key. What is returned offers the panel in a workspace by its key:
-    as a tab, and what was in front stays there."""
+    panels: Panels,
+    commands: Actions,
+    docks: dict[str, QDockWidget],
+    call_panel: Callable[[str], None],
+    workspace: Callable[[], str],
+) -> Callable[[], None]:
+    """call_panel: brings a panel to the front by its key. workspace: the key of the one that is shown.
+
+    What is returned offers the panel there: as a tab, and what was in front stays there.
+    """
     motion, tree = panels["motion"], panels["scene"]
     assert isinstance(motion, MotionPanel) and isinstance(tree, SceneTree)
 
@@ -34,11 +40,20 @@ def join_motion(
     def allow() -> None:
         commands["resume_scan"].setEnabled(motion.stopped is not None)
 
-    def offer(workspace: str) -> None:
-        if workspace == "setup" and motion.session.project.scene.frame_count > 1 and docks["motion"].isHidden():
+    def offer() -> None:
+        if workspace() == "setup" and motion.session.project.scene.frame_count > 1 and docks["motion"].isHidden():
             call_panel("motion")
             docks[BESIDE].raise_()
 
+    still = motion.session.project.scene.motion.kind
+
+    def follow() -> None:
+        nonlocal still
+        before, still = still, motion.session.project.scene.motion.kind
+        if before != still:
+            offer()
+
+    motion.session.project_changed.connect(follow)
     tree.motion_clicked.connect(call(lambda: None))
     commands.connect("scan", call(motion.ask_and_run))
     commands.connect("resume_scan", call(motion.ask_and_resume))

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.report.model import ReportInput
 from analysis.report.summary import headline, remarks, tiles
-from analysis.report.total import total
+from analysis.report.total import _half_by, total
 from analysis.report.units import micrometres
 from tests.analysis.report.test_report import extraction, make_frames, report_of
 
@@ -41,16 +41,25 @@ def test_outliers_that_make_the_rmse_are_told(outliers: int, size_px: float, tol
     assert told in said
 
 
-@pytest.mark.parametrize(("outliers", "few"), [(1, "1 outlier"), (2, "2 outliers")])
+@pytest.mark.parametrize(("outliers", "few"), [(1, "1 point"), (3, "2 points")])
 def test_a_report_begins_with_the_usual_error_where_outliers_make_the_rmse(outliers: int, few: str) -> None:
     """It began with an RMSE of 1265 um and a bias of a few gross outliers; 20.6 um stood small below."""
     report = with_outliers(outliers, 20.0)
     depth = (found := total(report.record.chosen())).depth_z
     first, second, third = tiles(found)[:3]
-    assert first == ("Depth robust sigma", micrometres(depth.robust_sigma), f"without {few}")
+    assert first == ("Depth robust sigma", micrometres(depth.robust_sigma), "of what most points err by")
     assert second[:2] == ("Depth median", micrometres(depth.median, 2)) and micrometres(depth.bias, 2) in second[2]
-    assert third == ("Depth RMSE", micrometres(depth.rmse), f"ruled by {few}")
+    assert third == ("Depth RMSE", micrometres(depth.rmse), f"half of its square by {few}")
     assert f"most scatter by {micrometres(depth.robust_sigma)} (robust sigma)" in headline(report)
+
+
+def test_the_points_that_make_the_rmse_are_counted_whether_outliers_of_the_image_or_not() -> None:
+    """181 um were said to be mostly of 3 outliers; without them 164 um were left, of a hundred points at edges."""
+    found = total(with_outliers(1, 20.0).record.chosen())
+    (half,) = [text for text in remarks(dataclasses.replace(found, half_by=62)) if "Half of the square" in text]
+    assert f"is of 62 of {found.points:,}".replace(",", "\u202f") in half and "1 point is an outlier" not in half
+    errors = np.array([9.0, -12.0, 2.0, np.nan, 0.5])
+    assert [_half_by(errors), _half_by(np.array([5.0, -5.0, 5.0, 5.0])), _half_by(np.array([np.nan]))] == [1, 2, 0]
 
 
 @pytest.mark.parametrize(("outliers", "size_px"), [(0, 0.0), (1, 1.5)])
@@ -71,7 +80,7 @@ def test_a_bias_that_all_points_have_is_not_laid_to_outliers() -> None:
         frames[i] = dataclasses.replace(frame, lasers=(changed,))
     found = total(report_of(scene, frames).record.chosen())
     said = " ".join(remarks(found))
-    assert "is mostly of" not in said and "dominate" not in said
+    assert "Half of the square" not in said
     with_calibration = " ".join(remarks(dataclasses.replace(found, calibration=found.depth_z.robust_sigma)))
     assert "common to all of them" in with_calibration and "common to all of them" not in said
 

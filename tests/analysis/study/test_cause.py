@@ -31,6 +31,7 @@ GOOD = {
         ({"unmeasured_rows": 0.5, "background": 400.0, "signal": 10000.0}, "not measurable"),
         ({"line_width": 4.0}, "out of focus or too wide"),
         ({"signal": 100.0}, "starved"),
+        ({"line_width": 0.8}, "too thin for the pixels"),
         ({"calibration_rmse": 1e-4}, "degenerate"),
         ({"calibration_rmse": 1e-4, "position_rmse": 2.0}, "less precise"),
         ({}, "less precise"),
@@ -38,3 +39,9 @@ GOOD = {
 )
 def test_the_largest_symptom_names_the_cause(changed: dict[str, float], expected: str) -> None:
     assert cause(GOOD, {**GOOD, **changed}) == expected
+
+
+def test_what_noise_makes_a_fit_take_for_light_beneath_the_line_drowns_it_not() -> None:
+    """In the dark a large read noise was called other light: 0.1 e- beneath the line had become 2."""
+    dark = {**GOOD, "background": 0.1, "signal": 3000.0}
+    assert cause(dark, {**dark, "background": 2.0, "position_rmse": 0.5}) == "less precise"

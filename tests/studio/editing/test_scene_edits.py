@@ -224,6 +224,8 @@ class TestLists:
             made, _ = scene_edits.set_motion(project, kind)
             assert isinstance(made.scene.motion, kind)
             assert made.scene.motion.moves == moves
+            if isinstance(made.scene.motion, Turntable):  # ten frames of a degree each had gone round by nine
+                assert made.scene.motion.angle_step * made.scene.motion.steps == pytest.approx(2.0 * np.pi)
         assert scene_edits.set_motion(project, NoMotion)[0].scene.frame_count == 1
 
     @pytest.mark.parametrize("template", ["sphere", "v_groove", "step_block", "weld_seam"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from PIL import Image
 
 import main
 from studio.photographs.bands import course
-from studio.photographs.evidence import AXES, Chain, find_evidence, shrink
+from studio.photographs.evidence import AXES, DOUBTFUL, Chain, find_evidence, shrink
 from studio.photographs.image_files import has_coarse_colour
 from tests.studio.photographs.colour_photographs import HEIGHT, Scene, photograph, write
 
@@ -272,3 +273,15 @@ def test_where_a_line_jumps_the_band_holds_both_of_its_places() -> None:
     inside = (low[25:30] <= 20) & (high[25:30] > 120)
     assert inside.all()
     assert high[10] < 60 and low[50] > 60
+
+
+def test_what_is_taken_for_a_line_where_there_is_none_is_doubted() -> None:
+    """In a rectangle beside the line, an edge of the part was told as a line without a word."""
+    room = Scene(room=40.0)
+    for seed in range(3):
+        of_edges = find_evidence([shrink(photograph(room, seed, laser=False), None)])
+        assert of_edges.score < DOUBTFUL and of_edges.warnings
+        of_line = find_evidence([shrink(photograph(room, seed), None)])
+        assert of_line.score > 2.0 * DOUBTFUL and not of_line.warnings
+    weak = replace(of_line, scores={axis: dict.fromkeys(names, 0.23) for axis, names in of_line.scores.items()})
+    assert any("evidence 0.23" in text and "may be an edge" in text for text in weak.warnings)

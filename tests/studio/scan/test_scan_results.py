@@ -16,6 +16,7 @@ from render.base.errors import InputError
 from render.output.frame_files import read_frame
 from studio.project.document import replaced
 from studio.project.project import Project
+from studio.project.templates import new_project
 from studio.scan import scan_results
 from studio.scan.point_sample import PointSample
 from studio.scan.result_series import ERROR_VIEWS
@@ -149,6 +150,15 @@ def test_a_scan_is_meant_by_its_folder_or_its_own_files(scanned: tuple[Path, Pat
     file, folder = scanned
     assert holds_scan(folder) == holds_scan(folder / "scan.json") == holds_scan(folder / "scan_project.json") == folder
     assert holds_scan(file) is holds_scan(file.parent) is holds_scan(folder / "frame_0000.json") is None
+
+
+def test_a_project_that_is_called_as_a_scans_manifest_is_a_project(tmp_path: Path) -> None:
+    """One of the template "Scan", saved as scan.json, could not be opened again."""
+    file = tmp_path / "p" / "scan.json"
+    new_project("plane", file.parent)
+    (file.parent / "project.json").rename(file)
+    assert holds_scan(file) is holds_scan(file.parent) is None
+    assert Project.load(file).name == "Tilted plane"
 
 
 def test_points_without_their_errors_are_refused_in_words(copy: Path) -> None:

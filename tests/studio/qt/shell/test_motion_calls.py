@@ -50,6 +50,8 @@ def test_a_project_that_moves_has_the_panel_behind_design_whenever_it_is_set_up(
     motion, design = window.panels["motion"], window.panels["readout"]
     assert window.workspace == "setup" and window.docks["motion"].isHidden()
     window.session.set(("scene", "motion"), LinearStage(step=(0.001, 0.0, 0.0), steps=4))
+    qtbot.waitUntil(lambda: not window.docks["motion"].isHidden())  # it asked for another workspace first
+    qtbot.waitUntil(lambda: not design.visibleRegion().isEmpty())
     for away in ("measure", "study"):
         window.switch_to(away)
         assert window.docks["motion"].isHidden()
