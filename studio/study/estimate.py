@@ -24,8 +24,8 @@ A_COLUMN = 5
 """Cells of a boundary's column, about."""
 
 NOISE_APART = (
-    "Values that leave the light as it is (sensor, laser power, extraction) share no render: how well a frame is "
-    "rendered depends on the noise (goal in depth); with the goal “errors of the image” they would share one."
+    "Each value takes a render of its own, as well as its noise asks for (goal in depth). With the goal “errors of the "
+    "image”, in Render, values of sensor, laser power or extraction share one, and the study is sooner done."
 )
 """Said of values that would share one, had they no goal."""
 

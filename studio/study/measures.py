@@ -35,10 +35,9 @@ MEASURES: dict[str, Measure] = {
     "depth_bias": Measure("depth bias", "µm", 1e6, signed=True),
     "depth_sigma": Measure("depth sigma", "µm", 1e6),
     "depth_robust_sigma": Measure("depth sigma, robust", "µm", 1e6),
-    "depth_bias_right": Measure(
-        "depth bias of the rows measured right, but for the line's ends", "µm", 1e6, signed=True
-    ),
-    "depth_sigma_right": Measure("depth sigma of the rows measured right, but for the line's ends", "µm", 1e6),
+    # of the rows that are measured right, but for the line's ends
+    "depth_bias_right": Measure("depth bias where measured right", "µm", 1e6, signed=True),
+    "depth_sigma_right": Measure("depth sigma where measured right", "µm", 1e6),
     "depth_p95": Measure("depth error, 95th percentile", "µm", 1e6),
     "depth_predicted_sigma": Measure("predicted depth sigma, median", "µm", 1e6),
     "depth_coverage": Measure("depth errors within 2 predicted sigma", "%", 100.0),

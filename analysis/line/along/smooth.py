@@ -113,7 +113,7 @@ def _told(ranks: list[Smoothed]) -> str:
     """What was done, for a person."""
     reach = np.concatenate([one.reach[np.isfinite(one.reach)] for one in ranks])
     if not len(reach):
-        return f"not smoothed along the line: nowhere {FEWEST} positions with a sigma"
+        return f"not smoothed along the line: no {FEWEST} positions with a sigma stand together"
     counts = {Kind(kind): sum(one.shocks[kind] for one in ranks) for kind in range(len(Kind))}
     kept = [_counted(counts[kind], kind.name.lower()) for kind in (Kind.CORNER, Kind.STEP) if counts[kind]]
     told = [f"smoothed along the line over {np.median(reach):.2g} scan lines (median)"]
