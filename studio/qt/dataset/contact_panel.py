@@ -11,8 +11,7 @@ from studio.dataset.contact_sheet import Picture
 from studio.qt.core.session import Session, one_of
 from studio.qt.dataset.dataset_work import DatasetWork
 
-PREVIEW = "Preview: {} scenes that the recipe draws"
-"""Whatever the number of those whose images are made."""
+PREVIEW = "Preview: the first {} scenes of the recipe"
 GAP = 6
 LINE = QColor("#e69f00")
 LINE_WIDTH = 1.5
@@ -51,9 +50,8 @@ class ContactPanel(QWidget):
         self.problem.setText(work.problem)
         self.problem.setVisible(bool(work.problem))
         anew = sum(len(picture.rejected) for picture in work.pictures.values())
-        drawn = PREVIEW.format(
-            work.shown if len(work.pictures) == work.shown else f"{len(work.pictures)} of {work.shown}"
-        )
+        made = len(work.pictures)
+        drawn = PREVIEW.format(work.shown) + (f", {made} of them so far" if made != work.shown else "")
         again = f"; {anew} were drawn anew, as they showed no line" if anew else ""
         self.told.setText(f"{drawn}{again}. The exact line is drawn on the upper half.")
         self.sheet.update()

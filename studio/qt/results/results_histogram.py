@@ -9,10 +9,7 @@ import pyqtgraph as pg
 from analysis.report.colour import method_colour
 from render.base.arrays import Float
 from studio.qt.results import plots
-from studio.scan.result_series import ErrorView, histogram, readable_unit, symmetric_limit
-
-PLOTTED = 99.5
-"""Percent of the errors within the axis."""
+from studio.scan.result_series import ErrorView, histogram, readable_unit
 
 
 class ErrorHistogram(pg.GraphicsLayoutWidget):  # type: ignore[misc]
@@ -35,7 +32,7 @@ class ErrorHistogram(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         for item in self._outlines:
             self.plot.removeItem(item)
         self._outlines = []
-        largest = max([symmetric_limit(error, PLOTTED) for error in measured.values()], default=1.0)
+        largest = max([plots.error_limit(error) for error in measured.values()], default=1.0)
         unit, self._factor = readable_unit(view.unit, largest)
         limit = self._factor * largest
         self.plot.setLabel("bottom", f"{view.title} / {unit}")

@@ -13,10 +13,8 @@ from render.base.arrays import Float
 from studio.qt.core import theme
 from studio.qt.results import plots
 from studio.scan.first_range import Column, line_range
-from studio.scan.result_series import ErrorView, Series, readable_unit, symmetric_limit
+from studio.scan.result_series import ErrorView, Series, readable_unit
 
-PLOTTED = 99.5
-"""Percent of the errors within the axis; the others are crosses at its ends."""
 REACH_PX = 6.0
 """From the mouse, of a dot that it is at."""
 
@@ -54,7 +52,7 @@ class RowPlots(plots.PointedPlots):
         for plot, item in self._drawn:
             plot.removeItem(item)
         self._drawn = []
-        largest = max([symmetric_limit(error, PLOTTED) for _, error in measured.values()], default=1.0)
+        largest = max([plots.error_limit(error) for _, error in measured.values()], default=1.0)
         unit, factor = readable_unit(view.unit, largest)
         measured = {method: (series, factor * error) for method, (series, error) in measured.items()}
         self._shown = measured

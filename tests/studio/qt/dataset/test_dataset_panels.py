@@ -124,7 +124,7 @@ def test_pictures_stand_side_by_side_within_the_sheet(desk: Desk, qtbot: QtBot) 
 def test_the_sheet_is_said_to_be_a_preview(desk: Desk, qtbot: QtBot) -> None:
     """With two scenes to be made it said "24 of 24 scenes"."""
     qtbot.waitUntil(lambda: desk.ready)
-    assert desk.sheet.told.text().startswith("Preview: 3 scenes that the recipe draws")
+    assert desk.sheet.told.text().startswith("Preview: the first 3 scenes of the recipe")
 
 
 def test_values_of_a_choice_have_names_and_units(desk: Desk) -> None:

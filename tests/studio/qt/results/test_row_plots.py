@@ -38,6 +38,17 @@ def test_points_beyond_the_axis_are_crosses_at_its_ends(plots: RowPlots) -> None
     assert low < -plots.limit and plots.limit < high < 100.0
 
 
+def test_errors_of_most_points_are_no_flat_line_beside_wrong_peaks(qtbot: QtBot, plots: RowPlots) -> None:
+    """The axis went to 5000 mm for a few wrong peaks, and errors of 10 um lay on its zero."""
+    error = np.random.default_rng(4).normal(0.0, 10.0, len(ROWS))
+    error[::12] = 4e6
+    flat = np.zeros(len(ROWS))
+    plots.show_series("rows", None, {"likelihood": (Series(ROWS, flat, flat, flat, flat), error)}, ERROR_VIEWS[0])
+    assert 20.0 < plots.limit < 100.0
+    crosses = plots._drawn[-1][1] if plots._drawn[-1][0] is plots.error else plots._drawn[-2][1]
+    assert len(crosses.getData()[0]) >= len(error[::12])
+
+
 def test_large_errors_are_drawn_in_mm(qtbot: QtBot) -> None:
     """The axis had 500k beside a table in mm, and the colours of the points +500000 µm."""
     plots, histogram, steps = RowPlots(), ErrorHistogram(), StepsPlot()
