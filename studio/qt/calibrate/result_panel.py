@@ -34,6 +34,11 @@ BOARD_WARP = (
     "<p>How far the board's middle stands out of the plane of its edges: the first number along its rows, the second "
     "along its columns, each with its sigma. It is found with everything else; a flat board has 0.</p>"
 )
+COLUMNS = (
+    "rms and worst over the volume, common to all points, as the calibration tells them of itself; line: what the "
+    "noise of the line adds to each"
+)
+TRUE_COLUMN = "; true: against the scanner that took the views"
 
 
 class CalibrationPanel(QWidget):
@@ -104,6 +109,8 @@ def page(solved: Solved, target_um: float | None, note: str = "") -> str:
         header = ["Depth error / µm", "rms", "worst", "line", *(["true"] if solved.true else [])]
         rows = depth_rows(result, None if solved.true is None else list(solved.true), solved.names)
         parts.append(_table(header, rows))
+        told = f"{COLUMNS}{TRUE_COLUMN if solved.true else ''}"
+        parts.append(f"<p style='color: {c.muted}'>{escape(told)}</p>")
     if result.advice is not None:
         name, _, told = next_sentence(result.advice, target_um).partition(": ")
         parts.append(f"<p style='color: {c.good if name == 'enough' else c.accent}'><b>{name}</b> {escape(told)}</p>")

@@ -114,7 +114,8 @@ class MeshBar(QWidget):
         def turned(item: SceneObject, vertices: Float) -> SceneObject:
             return mesh_placing.with_axis_up(item, vertices, axis)
 
-        self._place(f"{axis} up", turned)
+        if self._place(f"{axis} up", turned) and (now := selected_mesh(self.session)) is not None:
+            self.session.message.emit("info", f"{now.name} stands with {axis} of its file up; Ctrl+Z takes it back")
 
     def _fit(self) -> None:
         """The size of a part is what is measured: that it is another one now is said."""
@@ -171,7 +172,8 @@ class MeshBar(QWidget):
         now = selected_mesh(self.session) or before
         by = np.subtract(now.T_world_object.translation, before.T_world_object.translation)
         far = 1e3 * float(np.linalg.norm(by))  # mm
-        moved = f"{now.name} moved {far:.4g} mm, {where}; Ctrl+Z takes it back"
+        sense = "" if np.any(np.abs(by[:2]) > 1e-9) else " up" if by[2] > 0.0 else " down"
+        moved = f"{now.name} moved {far:.4g} mm{sense}, {where}; Ctrl+Z takes it back"
         self.session.message.emit("info", moved if far >= LEAST_MOVE else f"{now.name} stood {already} already")
 
     def _place(self, label: str, change: Callable[[SceneObject, Float], SceneObject]) -> bool:
