@@ -170,8 +170,8 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
     if dominated:
         said.append(
             f"Half of the square of the RMSE of {micrometres(found.depth_z.rmse)} is of {count(found.half_by)} of "
-            f"{counted(found.points, 'point')}, those with the largest errors, as at edges or of wrong peaks; most err "
-            f"by {micrometres(found.depth_z.robust_sigma)} (robust sigma)."
+            f"{counted(found.depth_z.count, 'point')}, those with the largest errors, as at edges or of wrong peaks; "
+            f"most err by {micrometres(found.depth_z.robust_sigma)} (robust sigma)."
         )
     off, allowed = abs(found.depth_z.median), SURELY * np.hypot(found.calibration, found.depth_z.robust_sigma)
     if found.calibration > 0.0 and off > allowed:

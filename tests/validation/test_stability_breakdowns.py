@@ -123,7 +123,7 @@ def test_a_line_drowns_in_other_light_as_in_the_noise_of_the_sensor(found: Found
         place = found.place(sweep, method)
         noise = math.sqrt(NOISE**2 + np.interp(place, lamps, light))
         ratio = found.curve(sweep, "likelihood", "signal")[1][0] / noise
-        print(f"{method}: lost at {place:.0f} W/(m^2 sr), a peak of {ratio:.2f} times the noise")
+        print(f"{method}: lost beside {place:.0f} W/sr, at a peak of {ratio:.2f} times the noise")
         assert 4.0 < ratio < 6.0 and found.cause(sweep, method) == "too much other light"
 
 

@@ -11,7 +11,6 @@ from studio.dataset.contact_sheet import Picture
 from studio.qt.core.session import Session, one_of
 from studio.qt.dataset.dataset_work import DatasetWork
 
-PREVIEW = "Preview: the first {} scenes of the recipe"
 GAP = 6
 LINE = QColor("#e69f00")
 LINE_WIDTH = 1.5
@@ -50,8 +49,10 @@ class ContactPanel(QWidget):
         self.problem.setText(work.problem)
         self.problem.setVisible(bool(work.problem))
         anew = sum(len(picture.rejected) for picture in work.pictures.values())
-        made = len(work.pictures)
-        drawn = PREVIEW.format(work.shown) + (f", {made} of them so far" if made != work.shown else "")
+        of_all = work.previewed
+        made = sum(number < of_all for number in work.pictures)
+        which = f"the first {of_all} scenes of the recipe" if of_all < work.scenes else f"the {of_all} scenes"
+        drawn = f"Preview: {which}" + (f", {made} of them so far" if made < of_all else "")
         again = f"; {anew} were drawn anew, as they showed no line" if anew else ""
         self.told.setText(f"{drawn}{again}. The exact line is drawn on the upper half.")
         self.sheet.update()
@@ -83,7 +84,7 @@ class Sheet(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        for number in range(self.work.shown):
+        for number in range(self.work.previewed):
             place = self.place(number)
             picture = self.work.pictures.get(number)
             if picture is None:
@@ -102,12 +103,12 @@ class Sheet(QWidget):
 
     def _columns(self, aspect: float) -> int:
         """As few as let all pictures fit into the height."""
-        for columns in range(1, self.work.shown + 1):
-            rows = -(-self.work.shown // columns)
+        for columns in range(1, self.work.previewed + 1):
+            rows = -(-self.work.previewed // columns)
             cell = (self.width() - GAP * (columns - 1)) / columns
             if rows * cell / aspect + GAP * (rows - 1) <= self.height():
                 return columns
-        return self.work.shown
+        return self.work.previewed
 
 
 def _paint(painter: QPainter, place: QRectF, picture: Picture) -> None:

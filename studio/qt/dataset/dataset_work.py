@@ -124,7 +124,7 @@ class DatasetWork(LongWork):
 
     def draw(self) -> None:
         """The first scenes of the recipe, one by one as they are ready."""
-        recipe, root, count, ready = self.recipe, self.root, self.shown, partial(self._ready.emit, self.recipe)
+        recipe, root, count, ready = self.recipe, self.root, self.previewed, partial(self._ready.emit, self.recipe)
 
         def work(progress: Progress, cancelled: Cancel) -> str:
             try:
@@ -160,8 +160,19 @@ class DatasetWork(LongWork):
         self.state_changed.emit()
 
     def choose_count(self, scenes: int) -> None:
-        self.scenes = scenes
+        """More than are drawn of them draw the others; fewer are looked at without drawing any."""
+        before, self.scenes = self.previewed, scenes
         self.state_changed.emit()
+        self.pictures_changed.emit()
+        if self.previewed > max(before, len(self.pictures)):
+            self._stale = True
+            if self.watched:
+                self._rest.start()
+
+    @property
+    def previewed(self) -> int:
+        """Scenes that are looked at: the first ones, and no more than are asked for."""
+        return min(self.shown, self.scenes)
 
     def made(self) -> int:
         """Images that the folder holds whole."""

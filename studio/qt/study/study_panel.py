@@ -222,7 +222,7 @@ class StudyPanel(QWidget):
 
     def _tell_estimate(self) -> None:
         work, empty = self.work, varies_nothing(self.work.draft)
-        self.problem.setText(work.failure or work.problem)
+        self.problem.setText("\n".join(dict.fromkeys(filter(None, (work.problem, work.failure)))))
         self.problem.setVisible(bool(self.problem.text()))
         if work.estimate is not None:
             self.told.setText(estimate_text(work.estimate, work.processors))

@@ -202,6 +202,7 @@ class StudyWork(LongWork):
         except InputError as error:
             self._fail(self._said(error))
             return False
+        self._fail("")
         self.session.message.emit("info", f"Saved the study: {file}")
         return True
 

@@ -57,7 +57,7 @@ def test_the_points_that_make_the_rmse_are_counted_whether_outliers_of_the_image
     """181 um were said to be mostly of 3 outliers; without them 164 um were left, of a hundred points at edges."""
     found = total(with_outliers(1, 20.0).record.chosen())
     (half,) = [text for text in remarks(dataclasses.replace(found, half_by=62)) if "Half of the square" in text]
-    assert f"is of 62 of {found.points:,}".replace(",", "\u202f") in half and "1 point is an outlier" not in half
+    assert f"is of 62 of {found.depth_z.count:,}".replace(",", "\u202f") in half and "1 point is an outlier" not in half
     errors = np.array([9.0, -12.0, 2.0, np.nan, 0.5])
     assert [_half_by(errors), _half_by(np.array([5.0, -5.0, 5.0, 5.0])), _half_by(np.array([np.nan]))] == [1, 2, 0]
 

@@ -125,6 +125,11 @@ def test_the_sheet_is_said_to_be_a_preview(desk: Desk, qtbot: QtBot) -> None:
     """With two scenes to be made it said "24 of 24 scenes"."""
     qtbot.waitUntil(lambda: desk.ready)
     assert desk.sheet.told.text().startswith("Preview: the first 3 scenes of the recipe")
+    there = dict(desk.work.pictures)
+    desk.panel.scenes.setValue(2)  # fewer draw nothing anew, and no scene is shown that will not be there
+    assert desk.sheet.told.text().startswith("Preview: the 2 scenes.") and not desk.work.drawing
+    desk.panel.scenes.setValue(30)
+    assert desk.work.pictures == there and desk.sheet.told.text().startswith("Preview: the first 3 scenes")
 
 
 def test_values_of_a_choice_have_names_and_units(desk: Desk) -> None:
