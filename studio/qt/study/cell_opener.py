@@ -19,6 +19,7 @@ from studio.qt.core.session import Session
 from studio.runtime.jobs import Job, Progress
 
 if TYPE_CHECKING:
+    from render.scene.scene import Scene
     from studio.notebook.frame import RenderedFrame
     from studio.study.cells import Cell
     from studio.study.folder_run import Found
@@ -39,6 +40,23 @@ class CellOpener(QObject):
         self.session = session
         self._waited_for = False
         self._job: Job[RenderedFrame | str] | None = None
+        self._looked_at: tuple[Render, Scene] | None = None
+        """A cell, and the open project's scene when it came into view."""
+        session.renders_changed.connect(self._follow)
+        session.project_changed.connect(self._let_go)
+
+    def _follow(self) -> None:
+        shown = self.session.shown
+        if shown is None or not shown.cell:
+            self._looked_at = None
+        elif self._looked_at is None or self._looked_at[0] is not shown:
+            self._looked_at = shown, self.session.project.scene
+
+    def _let_go(self) -> None:
+        """Who changes the scene wants to see it: a cell, which follows no change, would stand in its way."""
+        session = self.session
+        if self._looked_at is not None and session.project.scene != self._looked_at[1]:
+            session.show(next((one for one in reversed(session.renders) if not one.cell), None))
 
     def go_on(self) -> None:
         """The person does something else: what is being rendered is not to come in between."""

@@ -258,6 +258,10 @@ class TestRun:
         assert not desk.session.shown.is_stale(desk.session.project)
         desk.charts.open(1)  # it is among the renders already
         assert len(desk.session.renders) == 1
+        desk.session.set(NOISE, 3.0)  # the sensor is no part of the scene
+        assert desk.session.shown is not None
+        desk.session.set((*POWER[:-1], "fan_angle"), 0.7)  # the live estimate is of the scene that is changed
+        assert desk.session.shown is None and len(desk.session.renders) == 1
         develop.close()
 
     def test_who_has_gone_on_is_told_of_the_frame_and_sees_what_was_shown(
