@@ -33,6 +33,7 @@ from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, ShownDeviation
 from studio.qt.core.widgets import ElidedLabel, text_button
 from studio.qt.forms.unit_box import UnitBox
+from studio.qt.results.heads import measured_otherwise
 from studio.qt.results.shown_points import NOTHING, are_there, shown_points
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job
@@ -58,6 +59,9 @@ TAKEN = (
     "without an alignment; Ctrl+Z takes it back"
 )
 SPOTS_HINT = "x,y,z of six places on the nominal, mm, world: three, two, one; between them semicolons"
+OTHERWISE = (
+    "The points are as the scan was measured last; laser power, sensor, extraction or calibration has changed since."
+)
 
 
 class DeviationTab(QWidget):
@@ -287,6 +291,8 @@ class DeviationTab(QWidget):
             return
         record = found.record
         texts = [asked(record), f"{record['points']} points: {sentence(record)}", *details(record)]
+        if (shown := self.session.shown) is not None and measured_otherwise(self.session, shown):
+            texts.insert(0, OTHERWISE)
         self.told.setText("\n".join(texts))
         self._fit()
 

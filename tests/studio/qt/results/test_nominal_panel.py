@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -21,13 +22,13 @@ from studio.qt.core.jobs import JobRunner
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.results import section_tab
-from studio.qt.results.deviation_tab import DeviationTab
+from studio.qt.results.deviation_tab import OTHERWISE, DeviationTab
 from studio.qt.results.nominal_panel import NominalPanel
 from studio.qt.viewport.error_cloud import ErrorCloud
 from studio.qt.viewport.view3d import View3D
 from studio.scan.deviation import Question, compared
 from studio.scan.scan_folder import open_folder
-from tests.studio.scan_of_steps import small_scan
+from tests.studio.scan_of_steps import SCALE, small_scan
 
 
 @pytest.fixture(scope="module")
@@ -203,6 +204,22 @@ def test_figures_of_points_that_were_measured_before_say_why_they_are_gone(
     for _ in range(2):  # more than one signal comes of a measurement
         session.measured.emit()
         assert tab.compared is None and "Compare again" in tab.told.text()
+
+
+def test_points_that_were_measured_with_other_settings_say_so_beside_their_deviation(
+    panel: NominalPanel, session: Session, qtbot: QtBot
+) -> None:
+    """With another exposure the old figures and their verdict stood there without a word."""
+    tab = panel.deviation
+    assert session.shown is not None
+    session.show(replace(session.shown, image_scale=SCALE))  # as of a project at full size
+    tab.compare()
+    qtbot.waitUntil(lambda: tab.compared is not None)
+    assert OTHERWISE not in tab.told.text()
+    exposure = ("sensor", "exposure_time")
+    session.set(exposure, 2.0 * session.project.sensor.exposure_time)
+    tab.compare()
+    qtbot.waitUntil(lambda: tab.compared is not None and tab.told.text().startswith(OTHERWISE))
 
 
 def test_a_comparison_that_fails_leaves_no_figures(panel: NominalPanel, qtbot: QtBot) -> None:
