@@ -111,4 +111,4 @@ def test_a_ready_made_study_keeps_its_own(shown: Panels, qtbot: QtBot) -> None:
     with shown() as panel:
         panel.work.load("quick")
         qtbot.waitUntil(lambda: panel.work.unseen.job(beside.LANE) is None)
-        assert panel.scale.value() == Study.load("quick")[0].image_scale == 0.25
+        assert panel.scale.value() == Study.load("quick")[0].image_scale == 0.5
