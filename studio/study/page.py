@@ -146,7 +146,10 @@ def _bound_sentence(found: Bound, answer: Answer, labels: dict[str, str]) -> str
     measure = measure_of(answer.sweep.measure)
     photons = f"{found.photons * measure.scale:.3g} {measure.unit}"
     speckle = "" if found.speckle is None else f", and speckle {found.speckle * measure.scale:.3g} {measure.unit}"
-    return f"No method does better{at}: photon and read noise alone leave a depth sigma of {photons}{speckle}."
+    return (
+        f"No method that takes each scan line by itself does better{at}: photon and read noise alone leave a depth "
+        f"sigma of {photons}{speckle}."
+    )
 
 
 def write_bounds(folder: Path, answer: Answer, number: int) -> None:
