@@ -72,7 +72,7 @@ FIGURES = {
     "sigma": ("depth sigma", "um", 1e6),
     "robust_sigma": ("depth sigma, robust", "um", 1e6),
     "rmse": ("depth error, RMS", "um", 1e6),
-    "p95": ("depth error, 95th percentile", "um", 1e6),
+    "p95": ("depth error, P95", "um", 1e6),
     "measured": ("points on the line", "", 1.0),
     "completeness": ("completeness", "%", 100.0),
     "false": ("points without a line", "", 1.0),
