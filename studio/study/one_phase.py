@@ -7,19 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from functools import lru_cache
-from pathlib import Path
-
-import numpy as np
 
 from render.base.errors import InputError
-from studio.preview.preview import Preview
 from studio.project.project import Project
 from studio.scan.stages import scaled
+from studio.study.line_seen import line_seen
 from studio.study.study import Study, Sweep, with_fields
 
 TOGETHER = 0.99
-"""Length of the mean of unit vectors, a turn for each pixel: 1 at one place, about 0 where all places are met alike."""
+"""Of `LineSeen.together`: the line is at one place, but for a hundredth."""
 
 
 def one_phase_doubts(study: Study, bases: Mapping[str, Project]) -> tuple[str, ...]:
@@ -30,7 +26,7 @@ def one_phase_doubts(study: Study, bases: Mapping[str, Project]) -> tuple[str, .
         fixed = [{**study.set, **sweep.set} for sweep in of_line]
         with suppress(InputError):  # told where the cells are counted
             projects = [scaled(with_fields(base, each, "set"), study.image_scale) for each in fixed]
-            if any(_together(one.to_text(), base.folder, study.laser) > TOGETHER for one in projects):
+            if any(line_seen(one.in_folder(base.folder), study.laser).together > TOGETHER for one in projects):
                 alike.append(base.name)
     if not alike:
         return ()
@@ -42,11 +38,3 @@ def one_phase_doubts(study: Study, bases: Mapping[str, Project]) -> tuple[str, .
 
 def _is_of_line(sweep: Sweep) -> bool:
     return sweep.chart != "pictures" and any(name.startswith(("position_", "depth_")) for name in sweep.asked)
-
-
-@lru_cache(maxsize=64)
-def _together(text: str, folder: Path, laser: int) -> float:
-    """0 where no line is in the image. text: of the project."""
-    project = Project.from_text(text, "study").in_folder(folder)
-    position = Preview().look(project, folder).lit_curve(laser).position
-    return float(np.abs(np.mean(np.exp(2j * np.pi * position)))) if len(position) else 0.0

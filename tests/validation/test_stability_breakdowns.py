@@ -129,7 +129,7 @@ def test_a_line_drowns_in_other_light_as_in_the_noise_of_the_sensor(found: Found
 
 
 def test_three_points_fail_at_the_full_well_and_what_leaves_saturated_pixels_out_never(found: Found) -> None:
-    """Three points at 1 to 2 times the full well, Blais-Rioux between 30 and 100, censored fits never."""
+    """Three points at 1 to 2 times the full well, censored fits never; Blais-Rioux at 30 to 100, here at 20."""
     sweep, full = "Too much light", FULL_WELL / peak_rate(found)
     times = {method: found.place(sweep, method) / full for method in EXPERIMENT}
     print({method: round(value, 2) for method, value in times.items()})

@@ -10,13 +10,13 @@ import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF
 
+from analysis.measures import MAD_TO_SIGMA
 from analysis.report.units import counted
 from render.base.arrays import Float
 from studio.qt.core import theme
 from studio.scan.result_series import symmetric_limit
 
 pg.setConfigOptions(antialias=False)
-
 
 PLOTTED = 99.5
 """Percent of the errors within an axis, of those that are not FAR."""
@@ -27,7 +27,7 @@ FAR = 30.0
 def error_limit(error: Float) -> float:
     """Of an axis of errors (n,) centred on zero, with NaN; what lies beyond is drawn at its ends."""
     size = np.abs(error[np.isfinite(error)])
-    near = size[size <= FAR * 1.4826 * np.median(size)] if len(size) else size
+    near = size[size <= FAR * MAD_TO_SIGMA * np.median(size)] if len(size) else size
     return symmetric_limit(near if np.any(near > 0.0) else size, PLOTTED)
 
 

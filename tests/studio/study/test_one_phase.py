@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from studio.study.one_phase import one_phase_doubts
 from studio.study.study import Parameter, Study, Sweep, base_project, ready_made
 
@@ -11,12 +13,12 @@ SWEEP = Sweep(name="light", vary=(Parameter(field="sensor.exposure_time", values
 
 def doubts(base: str, **fixed: float) -> tuple[str, ...]:
     study = Study(base=base, set=fixed, sweeps=(SWEEP,), image_scale=0.25)
-    return one_phase_doubts(study, study.bases(None))  # type: ignore[arg-type]
+    return one_phase_doubts(study, study.bases(Path()))
 
 
 def test_a_line_along_the_columns_is_told_and_a_rolled_camera_cures_it() -> None:
     (told,) = doubts("plane")
-    assert "one place between two pixels" in told and base_project("plane", None).name in told  # type: ignore[arg-type]
+    assert "one place between two pixels" in told and base_project("plane", Path()).name in told
     assert not doubts("plane", **{ROLL: 0.03})
 
 

@@ -23,6 +23,7 @@ from studio.qt.study.study_work import StudyWork
 from studio.study import small_images
 from studio.study.draft import IMAGE_SCALE
 from studio.study.kept_draft import kept_draft
+from studio.study.line_seen import LineSeen
 from studio.study.small_images import first_scale, small_image_doubts
 from studio.study.study import Study
 
@@ -49,11 +50,11 @@ def test_it_is_the_first_at_which_the_line_is_not_said_to_be_too_thin() -> None:
 def test_by_the_width_of_the_line(width_of_one: float | None, scale: float, monkeypatch: pytest.MonkeyPatch) -> None:
     base = Project.load(template_folder("plane"))
 
-    def width(text: str, folder: Path, laser: int) -> float | None:
-        across = Project.from_text(text, "text").scene.camera.width / base.scene.camera.width
-        return None if width_of_one is None else across * width_of_one
+    def seen(project: Project, laser: int) -> LineSeen:
+        across = project.scene.camera.width / base.scene.camera.width
+        return LineSeen(None if width_of_one is None else across * width_of_one, 0.0)
 
-    monkeypatch.setattr(small_images, "_width", width)
+    monkeypatch.setattr(small_images, "line_seen", seen)
     assert first_scale(base) == scale
 
 
@@ -61,7 +62,7 @@ def test_a_project_without_a_preview_keeps_the_usual_one(monkeypatch: pytest.Mon
     def none(*_: object) -> None:
         raise InputError("there is no part")
 
-    monkeypatch.setattr(small_images, "_width", none)
+    monkeypatch.setattr(small_images, "line_seen", none)
     assert first_scale(Project.load(template_folder("plane"))) == IMAGE_SCALE
 
 
