@@ -74,7 +74,7 @@ def extract(
     alone = chosen.select == "strongest" and volume is None
     wanted = chosen if alone else chosen.model_copy(update={"peaks": max(chosen.peaks, CANDIDATES)})
     # fused exposures hold so many electrons that no lens draws a line which is a Gaussian to their noise
-    line = replace(measure(lines, wanted, threads, judge=judged and variance is None), note=note)
+    line = replace(measure(lines, wanted, threads, judge=judged and variance is None, passing=alone), note=note)
     if chosen.select == "learned":
         line = with_hidden(line, lines, wanted, threads)
     check_finite("line", positions=line.u[line.valid])

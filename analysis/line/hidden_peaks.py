@@ -11,7 +11,7 @@ from analysis.line.detection.channel import Lines, smoothed_covariances, smoothi
 from analysis.line.detection.detect import SEED_COLUMNS
 from analysis.line.detection.hidden import Sought, bend_gain, detect_hidden
 from analysis.line.measure import CHUNK, METHODS, line_of, options_of
-from analysis.line.methods.seed_loop import ROOM, SHARED, TOLD, Pixels, seed_kernel
+from analysis.line.methods.seed_loop import CHI2, ROOM, SHARED, TOLD, Pixels, seed_kernel
 from analysis.line.result import Flag, Line, positioned, side_by_side
 from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float
@@ -19,8 +19,6 @@ from render.base.threads import map_chunks
 
 HIDDEN = 4
 """Peaks of a scan line."""
-CHI2 = 5
-"""Column of what a kernel writes."""
 CLEAR = 0.8
 """Of the detection threshold, as it is not for them to say what the line is."""
 

@@ -262,7 +262,9 @@ def _moves_of_each(
     """
     tried = np.unique(rows)
     near = np.unique(np.clip(tried[:, None] + np.arange(-NEIGHBOURS, NEIGHBOURS + 1), 0, lines.count - 1))
-    _, neighbours = measure_with_neighbours(replace(lines, image=lines.image[near]), settings, threads, judge=True)
+    _, neighbours = measure_with_neighbours(
+        replace(lines, image=lines.image[near]), settings, threads, judge=True, passing=True
+    )
     place = np.searchsorted(near, rows)
     peaks, flags = [], []
     for start in range(0, len(rows), AT_ONCE):
@@ -285,7 +287,7 @@ def _moves_of_all(
         some = np.flatnonzero(turn == now)
         image = lines.image.astype(np.float64)
         image[rows[some], pixel[some]] += step[some]
-        found = measure(replace(lines, image=image), settings, threads, judge=True)
+        found = measure(replace(lines, image=image), settings, threads, judge=True, passing=True)
         peaks[some], flags[some] = np.where(found.valid, found.u, np.inf)[rows[some]], found.flag[rows[some]]
     return peaks, flags
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.line.detection.channel import MISSING, Lines, smoothed_covariances, smoothing_correlation
-from analysis.line.detection.detect import PRIOR, PRIOR_WIDTHS, SEED_COLUMNS, Limits, detect
+from analysis.line.detection.detect import PRIOR, PRIOR_WIDTHS, Limits
 from analysis.line.detection.matched_filter import response_gain
 from analysis.line.methods.blais_rioux import measure_zero_crossing
 from analysis.line.methods.centre_of_mass import measure_centroid
@@ -39,8 +40,10 @@ from analysis.line.methods.shared_width import width_priors
 from analysis.line.methods.steger_2d import HALO, NORMAL_CENTROID, RIDGE, fill_gaps, measure_ridge
 from analysis.line.methods.three_point import GAUSS, LINEAR, MAXIMUM, PARABOLA, measure_three_pixels
 from analysis.line.methods.threshold import SUBTRACTED, WHOLE, measure_above_threshold
+from analysis.line.passed_over import pass_over, seeds_of
 from analysis.line.result import SYSTEMATIC, Flag, Line
 from analysis.line.settings import ExtractionSettings
+from render.base.arrays import Long
 from render.base.threads import map_chunks
 
 CHUNK = 128
@@ -70,12 +73,14 @@ class Neighbours(NamedTuple):
     """Taken for one line, and two by the neighbours."""
     parted: NDArray[np.bool_]
     """Parted by noise alone, as the neighbours do not part."""
+    passed: Long
+    """(n,) peaks that are passed over, as they are none."""
 
     def of(self, rows: NDArray[np.intp]) -> Neighbours:
         """Of some scan lines (m,)."""
         # all zero: no line needs any
         priors = np.zeros((*self.leaning.shape, len(PRIOR_WIDTHS))) if self.priors is None else self.priors
-        return Neighbours(priors[rows], self.leaning[rows], self.parted[rows])
+        return Neighbours(priors[rows], self.leaning[rows], self.parted[rows], self.passed[rows])
 
 
 METHODS = {
@@ -113,12 +118,16 @@ def limits_of(lines: Lines, settings: ExtractionSettings) -> Limits:
     )
 
 
-def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, judge: bool = False) -> Line:
+def measure(
+    lines: Lines, settings: ExtractionSettings, threads: int | None, judge: bool = False, passing: bool = False
+) -> Line:
     """Scan lines -> Line with arrays (n, peaks); a chunk writes its own rows, so threads change nothing.
 
     judge: what is no single Gaussian line is measured as two, or flagged; not for who asks how well a line fits.
+    passing: where the only peak asked for is no line, the next one is measured (`passed_over`); not for who asks what
+    the noise is, without which nobody can tell a line from a bump of it.
     """
-    return measure_with_neighbours(lines, settings, threads, judge)[0]
+    return measure_with_neighbours(lines, settings, threads, judge, passing)[0]
 
 
 def measure_with_neighbours(
@@ -126,6 +135,7 @@ def measure_with_neighbours(
     settings: ExtractionSettings,
     threads: int | None,
     judge: bool = False,
+    passing: bool = False,
     told: Neighbours | None = None,
 ) -> tuple[Line, Neighbours]:
     """As `measure`, and what neighbours tell of each peak.
@@ -140,6 +150,7 @@ def measure_with_neighbours(
     out = np.empty((lines.count, settings.peaks, COLUMNS if tells_width else TOLD))
     flags = np.empty((lines.count, settings.peaks), np.uint8)
     limits = limits_of(lines, settings)
+    passed = np.zeros(lines.count, np.int64) if told is None else told.passed
     options = options_of(settings)._replace(judge=UNLIKELY if judge else math.inf)
 
     light = smoothed_covariances(lines.noise, settings.smoothing)
@@ -157,9 +168,7 @@ def measure_with_neighbours(
         first, last = max(0, start - halo), min(lines.count, stop + halo)
         signal, mask, floor = lines.read(first, last)
         own = slice(start - first, stop - first)
-        seeds = np.zeros((stop - start, settings.peaks, SEED_COLUMNS))
-        found = np.empty((stop - start, settings.peaks), np.uint8)
-        detect(signal[own], mask[own], floor[own], limits, seeds, found)
+        seeds, found = seeds_of((signal[own], mask[own], floor[own]), limits, settings.peaks, passed[start:stop])
         if priors is not None:
             seeds[..., PRIOR:] = priors[start:stop]
         if halo and (mask & MISSING).any():
@@ -175,34 +184,46 @@ def measure_with_neighbours(
         run(pixels, seeds, found, options, measured)
         out[start:stop][chosen], flags[start:stop][chosen] = measured[chosen], found[chosen]
 
-    chunk = TALL_CHUNK if halo else CHUNK
-    map_chunks(lambda start, stop: work(start, stop, options, priors), lines.count, chunk, threads)
+    def run_all(options: Options, priors: NDArray[np.float64] | None, again: NDArray[np.bool_] | None = None) -> None:
+        chunk = TALL_CHUNK if halo else CHUNK
+        map_chunks(lambda start, stop: work(start, stop, options, priors, again), lines.count, chunk, threads)
+
+    run_all(options, priors)
+    if passing and told is None and settings.peaks == 1:
+        pass_over(out, flags, passed, settings.threshold, partial(run_all, options, None))
     together = np.zeros((lines.count, settings.peaks))
     if tells_width and told is None:
-        shared = [width_priors(out[:, k, TOLD:], out[:, k, 0], out[:, k, 1]) for k in range(settings.peaks)]
-        if any(one is not None for one in shared):
-            none = np.zeros((lines.count, len(PRIOR_WIDTHS)))
-            priors = np.stack([none if one is None else one[0] for one in shared], axis=1)
-            together = np.stack([none[:, 0] if one is None else one[1] for one in shared], axis=1)
-            again: NDArray[np.bool_] = np.any(priors, axis=(1, 2))
-            map_chunks(lambda start, stop: work(start, stop, options, priors, again), lines.count, CHUNK, threads)
+        priors, together = _shared_widths(out)
+        if priors is not None:
+            run_all(options, priors, np.any(priors, axis=(1, 2)))
     farthest = lines.image.shape[1] / np.sqrt(12.0)  # a position that says less than a guess is none
     length, alike = np.maximum(out[..., CORRELATION_LENGTH], lines.alike), lines.noise.alike and lines.seen is None
     every = no_gaussian_by_neighbours(out[..., LEAN], out[..., FIT], length, alike) if told is None else told.leaning
     leaning = every & np.isin(flags, (Flag.OK, Flag.UNRESOLVED))
     if leaning.any():
-        double, single = options._replace(judge=0.0), out[leaning]
-        map_chunks(lambda start, stop: work(start, stop, double, priors, leaning), lines.count, CHUNK, threads)
+        single = out[leaning]
+        run_all(options._replace(judge=0.0), priors, leaning)
         keep_sure(out, flags, leaning, single, farthest)
     parted = parts_alone(flags, out[..., LEAN]) if told is None else told.parted
     alone = parted & (flags == Flag.OK)
     if alone.any():
-        plain, double = options._replace(judge=math.inf), out[alone]
-        map_chunks(lambda start, stop: work(start, stop, plain, priors, alone), lines.count, CHUNK, threads)
+        double = out[alone]
+        run_all(options._replace(judge=math.inf), priors, alone)
         keep_doubtful(out, flags, alone, double)
     lost = out[..., 1] > farthest
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
-    return line_of(out, flags, settings, together, lines), Neighbours(priors, leaning, parted)
+    return line_of(out, flags, settings, together, lines), Neighbours(priors, leaning, parted, passed)
+
+
+def _shared_widths(out: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, NDArray[np.float64]]:
+    """What kernels wrote of peaks (n, k, columns) -> (n, k, widths), column PRIOR of a seed, None where no peak needs
+    any, and (n, k), what makes of their column SHARED the error that neighbours have in common."""
+    none = np.zeros((len(out), len(PRIOR_WIDTHS)))
+    shared = [width_priors(out[:, k, TOLD:], out[:, k, 0], out[:, k, 1]) for k in range(out.shape[1])]
+    if all(one is None for one in shared):
+        return None, np.zeros(out.shape[:2])
+    priors = np.stack([none if one is None else one[0] for one in shared], axis=1)
+    return priors, np.stack([none[:, 0] if one is None else one[1] for one in shared], axis=1)
 
 
 def options_of(settings: ExtractionSettings) -> Options:

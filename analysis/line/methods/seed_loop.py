@@ -28,11 +28,11 @@ from render.base.arrays import Float32
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-WIDTH, CORRELATION_LENGTH, SHARED, LEAN, FIT, TOLD = 2, 6, 7, 8, 9, 10
-"""Columns of out: px; scan lines; covariance of place and width, px^2, of a narrow line; a normal deviate where the
-line is as one Gaussian, +-infinity where it is measured as something else; that of what the single line leaves over;
-from TOLD on the logarithm of the likelihood of each of PRIOR_WIDTHS at the likeliest place, and then that over all
-places; by methods that fit a width alone, and the first NaN where there is nothing to tell."""
+WIDTH, CHI2, CORRELATION_LENGTH, SHARED, LEAN, FIT, TOLD = 2, 5, 6, 7, 8, 9, 10
+"""Columns of out: px; reduced; scan lines; covariance of place and width, px^2, of a narrow line; a normal deviate
+where the line is as one Gaussian, +-infinity where it is measured as something else; that of what the single line
+leaves over; from TOLD on the logarithm of the likelihood of each of PRIOR_WIDTHS at the likeliest place, and then that
+over all places; by methods that fit a width alone, and the first NaN where there is nothing to tell."""
 COLUMNS = TOLD + 2 * len(PRIOR_WIDTHS)
 """Of out."""
 ROOM = 11
