@@ -83,7 +83,7 @@ def frames(
     """
     world, scene, step = placed.world, placed.scene, placed.step
     goal = run.goal if settings.goal is not None and scene.lasers else None
-    run = _begun(replace(run, goal=goal, memory=run.memory or Memory()))
+    run = _begun(replace(run, goal=goal, memory=run.memory or Memory(one_frame=True)))
     with clock.stage("acceleration structure", _build_work(world)):
         check_placement(world, scene, step)
         run.stop()
@@ -123,6 +123,7 @@ def frames(
                 shown = frame = replace(frame, seconds=clock.so_far(), counts=counts)
                 with clock.shown():
                     yield frame
+        look = None if frame.ambient is not None and not follows else look
         told = product.group == "indirect" and not follows  # what is told of a frame is of all its light
         if goal is not None and product.group in AIMING and (told or aimed_later(waiting[i + 1 :], product)):
             with clock.stage(AIM, 0):

@@ -43,17 +43,20 @@ class Checkpoint(Protocol):
 class Memory:
     """What a frame leaves to those after it, which would find the same: the last value of each part of the light."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, one_frame: bool = False) -> None:
+        """one_frame: nothing is kept that only frames after it would find again."""
         self._kept: dict[str, tuple[object, Any, Any]] = {}
+        self._one_frame = one_frame
 
     def recall(self, part: str, world: object, made_of: Any) -> Any:
         """The value of a part that was made in the very same world, of the equal; None: there is none."""
         kept = self._kept.get(part)
         return kept[2] if kept is not None and kept[0] is world and kept[1] == made_of else None
 
-    def keep(self, part: str, world: object, made_of: Any, value: object) -> None:
-        """Of a part as of now, in place of the one before."""
-        self._kept[part] = world, made_of, value
+    def keep(self, part: str, world: object, made_of: Any, value: object, *, for_others: bool = False) -> None:
+        """Of a part as of now, in place of the one before; for_others: the frame itself asks for it but once."""
+        if not (for_others and self._one_frame):
+            self._kept[part] = world, made_of, value
 
 
 def never() -> bool:
@@ -130,10 +133,10 @@ class Run:
         """As `Memory.recall`."""
         return None if self.memory is None else self.memory.recall(part, world, made_of)
 
-    def leave(self, part: str, world: object, made_of: Any, value: object) -> None:
+    def leave(self, part: str, world: object, made_of: Any, value: object, *, for_others: bool = False) -> None:
         """As `Memory.keep`."""
         if self.memory is not None:
-            self.memory.keep(part, world, made_of, value)
+            self.memory.keep(part, world, made_of, value, for_others=for_others)
 
     def taught(self, part: str) -> Any:
         """What the first frame of the block found of a part; None: this is it, or there is no block."""

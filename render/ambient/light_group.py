@@ -98,7 +98,7 @@ class AmbientLight(LightGroup[AmbientPlan]):
                 return
             for image in image_light(placed, target=target, **how, run=part):
                 yield image
-            run.leave(self.field, placed.world, made_of, image)
+            run.leave(self.field, placed.world, made_of, image, for_others=True)
 
         for image in replace(run, part="ambient").until_over(images):
             run.teach(self.field, image.radiance)

@@ -112,7 +112,7 @@ def _coarse(placed: PlacedScene, paths: CameraPaths, settings: tuple[Any, ...], 
         found = taken_over(lesson, placed, replace(paths, seed=run.shifted(CHECK_SEED).seed), run)
     if found is None:
         found = coarse_image(paths, placed.camera.height, int(_share(settings[0]) * budget), run)
-    run.leave(COARSE, world, made_of, found)
+    run.leave(COARSE, world, made_of, found, for_others=True)
     run.teach(COARSE, CoarseLesson(found, placed, made_of))
     return found
 

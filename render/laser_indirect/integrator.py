@@ -41,7 +41,7 @@ from render.laser_indirect.guiding import (
 from render.laser_indirect.lesson import ReflectedLesson
 from render.laser_indirect.line_goal import Weigh
 from render.laser_indirect.line_paths import alike_on_a_line
-from render.laser_indirect.lone_light import spread
+from render.laser_indirect.lone_light import spread_lone
 from render.laser_indirect.path_vertex import ALL_KINDS
 from render.laser_indirect.photon_emission import FAN_BINS, FanDistribution, guided_fan, uniform_fan, visible_fan_range
 from render.run import Run
@@ -210,12 +210,7 @@ def with_lone_spread(so_far: Accumulator, shape: tuple[int, int]) -> tuple[Float
     """(h, w) radiance so far, with the peaks of single passes spread, and the share of it that was; None: no line is
     the goal."""
     radiance, lone = so_far.radiance(shape), so_far.lone(shape)
-    if lone is None:
-        return radiance, None
-    moved, whole = float(lone.sum(dtype=np.float64)), float(radiance.sum(dtype=np.float64))
-    if not moved > 0.0:
-        return radiance, 0.0
-    return np.maximum(radiance - lone, 0.0) + spread(lone), moved / whole
+    return radiance, None if lone is None else spread_lone(radiance, lone)
 
 
 class Waves:

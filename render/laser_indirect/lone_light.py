@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Bool, Float, Float32
+from render.base.nonzero import nonzero_places
 from render.base.threads import map_chunks
 from render.importance import CELL
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
@@ -43,19 +44,39 @@ def lone_light(total: Float, largest: Float32, weight: float, projection: Projec
     return out
 
 
-def spread(light: Float32) -> Float32:
-    """(h, w) smoothed over SPREAD_SIGMA; the sum stays."""
+def spread_lone(radiance: Float32, lone: Float32) -> float:
+    """Smooth, in place, the part `lone` of radiance (h, w) over SPREAD_SIGMA, and return its share; the sum stays."""
+    places = nonzero_places(lone)
+    if len(places) == 0:
+        return 0.0
+    (height, width), light = radiance.shape, lone.ravel()[places]
+    moved, whole = float(light.sum(dtype=np.float64)), float(radiance.sum(dtype=np.float64))
+    flat = radiance.reshape(-1)
+    flat[places] = np.maximum(flat[places] - light, 0.0)
+    down, across = -(-height // COARSE), -(-width // COARSE)
+    cell = places // width // COARSE * across + places % width // COARSE
+    sums = np.bincount(cell, light, down * across).astype(np.float32).reshape(down, across)
+    coarse = smoothed(sums / np.float32(COARSE**2), SPREAD_SIGMA / COARSE)
+    bands = range(0, down, COARSE)
+    # beyond the edges that the blocks go over
+    found = sum(float(_fine(coarse, start, radiance.shape).sum(dtype=np.float64)) for start in bands)
+    for start in bands:
+        fine = _fine(coarse, start, radiance.shape)
+        radiance[start * COARSE :][: len(fine)] += fine * np.float32(moved / found if found > 0.0 else 0.0)
+    return moved / whole
+
+
+def _fine(coarse: Float32, start: int, shape: tuple[int, int]) -> Float32:
+    """Some rows of an image (h, w), from those of the coarse one that begin at `start`; all of it at once would be as
+    large as the image."""
     import cv2
 
-    height, width = light.shape
-    padded = np.pad(light, ((0, -height % COARSE), (0, -width % COARSE)))
-    down, across = (size // COARSE for size in padded.shape)
-    sums = padded.reshape(down, COARSE, across, COARSE).sum(axis=(1, 3), dtype=np.float32)
-    coarse = smoothed(sums / np.float32(COARSE**2), SPREAD_SIGMA / COARSE)
-    fine = cv2.resize(coarse, (across * COARSE, down * COARSE), interpolation=cv2.INTER_LINEAR)[:height, :width]
-    found = float(fine.sum(dtype=np.float64))
-    # beyond the edges that the blocks go over
-    return fine * np.float32(float(light.sum(dtype=np.float64)) / found if found > 0.0 else 0.0)
+    low, high = max(start - 1, 0), min(start + COARSE + 1, len(coarse))
+    wide = cv2.resize(
+        coarse[low:high], (coarse.shape[1] * COARSE, (high - low) * COARSE), interpolation=cv2.INTER_LINEAR
+    )
+    rows = min(shape[0] - start * COARSE, COARSE * COARSE)
+    return wide[(start - low) * COARSE :][:rows, : shape[1]]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

@@ -10,7 +10,7 @@ from render.laser_indirect.accumulator import Accumulator
 from render.laser_indirect.connection_buffer import PassBuffer
 from render.laser_indirect.guiding import BINS
 from render.laser_indirect.integrator import empty_buffer, with_lone_spread
-from render.laser_indirect.lone_light import SPREAD_SIGMA, spread
+from render.laser_indirect.lone_light import SPREAD_SIGMA, spread_lone
 from tests.render.laser_indirect.test_accumulator import nothing
 
 SHAPE = HEIGHT, WIDTH = 150, 200
@@ -94,7 +94,18 @@ def test_the_brightest_pass_goes_through_a_checkpoint() -> None:
 def test_what_is_spread_keeps_its_sum_also_at_the_edge(place: tuple[int, int]) -> None:
     light = np.zeros(SHAPE, np.float32)
     light[place] = 7.0
-    found = spread(light)
+    found = light.copy()
+    assert spread_lone(found, light) == 1.0
     assert found.sum(dtype=float) == pytest.approx(7.0, rel=1e-5) and found.min() >= 0.0
     assert found.max() < 7.0 / SPREAD_SIGMA**2
-    assert not spread(np.zeros(SHAPE, np.float32)).any()
+
+
+def test_what_is_spread_has_no_seam() -> None:
+    """It is drawn in bands of rows; a Gaussian of 16 px changes by 4 % of its height from row to row."""
+    light = np.zeros(SHAPE, np.float32)
+    light[60, 100] = 7.0
+    found = light.copy()
+    spread_lone(found, light)
+    steps = np.abs(np.diff(found, axis=0))
+    assert steps.max() < 0.04 * found.max()
+    assert np.unravel_index(found.argmax(), SHAPE)[0] in range(56, 64)
