@@ -15,10 +15,11 @@ from render.base.files import atomic_write
 from render.base.threads import Cancel
 from studio.dataset.contact_sheet import Picture, pictures
 from studio.dataset.folder import images_in, is_of
+from studio.dataset.image_kind import image_kind, notes_of_depth
 from studio.dataset.own_recipe import check_place, recipe_of, suggested_draw
 from studio.dataset.recipe import Recipe, base_of
 from studio.dataset.run import Result, Wanted, make_dataset
-from studio.dataset.written import image_kind, written_pictures
+from studio.dataset.written import written_pictures
 from studio.editing.forms import FieldSpec
 from studio.project.document import FieldPath
 from studio.project.project import Project
@@ -308,7 +309,9 @@ class DatasetWork(LongWork):
         if isinstance(ended, str):
             self._tell(ended)
         else:
-            self.session.message.emit("info", f"The dataset is done: {ended.images} images in {self.folder}")
+            told = f"The dataset is done: {ended.images} images in {self.folder}"
+            dataset = ended.dataset
+            self.session.message.emit("info", "\n".join([told, *notes_of_depth(dataset.recipe, dataset.base)]))
 
     def _tell(self, problem: str) -> None:
         self.problem = problem

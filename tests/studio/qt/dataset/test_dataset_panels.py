@@ -177,10 +177,13 @@ def test_images_that_were_written_are_shown_with_the_line_of_their_labels(
     desk: Desk, qtbot: QtBot, tmp_path: Path
 ) -> None:
     assert desk.sheet.choice.isHidden()
+    told: list[str] = []
+    desk.session.message.connect(lambda level, text: told.append(text))
     desk.work.choose_count(2)
     desk.work.choose_folder(tmp_path / "images")
     desk.work.start()
     qtbot.waitUntil(lambda: desk.work.shows_written)
+    assert "4 images in" in told[-1] and "12-bit numbers, 0 to 4095" in told[-1]
     assert not desk.sheet.choice.isHidden() and desk.sheet.choice.currentIndex() == 1
     assert desk.sheet.told.text().startswith("The first 3 images of the folder images, as written")
     picture = desk.work.written[0]
