@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtGui import QColor, QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QDialog, QLineEdit, QListWidget, QListWidgetItem, QMenu, QVBoxLayout
+from PySide6.QtWidgets import QDialog, QDockWidget, QLineEdit, QListWidget, QListWidgetItem, QMenu, QVBoxLayout
 
 from analysis.gauges.gauge import TITLES, Kind
 from analysis.report.gauge_table import DEFINITIONS
@@ -146,8 +146,11 @@ def entries(window: MainWindow) -> list[Entry]:
             elif name and not action.isSeparator():
                 keys = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
                 text, tip = f"{path} > {name}" + (f"   {keys}" if keys else ""), action.statusTip()
-                words = WORDS.get(action.objectName() or name, "")
-                listed.append(Entry(name, text, f"{path} {tip}", tip, action.isEnabled(), action.trigger, words=words))
+                words, dock = WORDS.get(action.objectName() or name, ""), action.parent()
+                # who looks for a panel that is there wants to see it, and its entry in the menu would close it
+                there = isinstance(dock, QDockWidget) and not dock.isHidden()
+                act = partial(window.show_panel, dock.objectName()) if there and dock is not None else action.trigger
+                listed.append(Entry(name, text, f"{path} {tip}", tip, action.isEnabled(), act, words=words))
 
     for action in window.menuBar().actions():
         menu = action.menu()

@@ -113,6 +113,20 @@ def test_workspaces_and_commands_are_found_by_words_of_others(
     assert search.list.item(0).text().startswith(text)
 
 
+def test_a_panel_that_is_there_is_not_closed_by_looking_for_it(window: MainWindow, qtbot: QtBot) -> None:
+    window.switch_to("setup")
+    assert not window.docks["readout"].isHidden() and window.docks["log"].isHidden()
+    for typed, key in (("baseline", "readout"), ("messages", "log")):
+        search = CommandSearch(window)
+        qtbot.addWidget(search)
+        search.show_found(typed)
+        texts = [search.list.item(i).text() for i in range(search.list.count())]
+        search.list.setCurrentRow(next(i for i, text in enumerate(texts) if text.startswith("View > ")))
+        search.choose()
+        QApplication.processEvents()
+        qtbot.waitUntil(lambda key=key: not window.docks[key].isHidden())
+
+
 def test_every_word_for_a_command_is_of_one_that_there_is(window: MainWindow, qtbot: QtBot) -> None:
     search = CommandSearch(window)
     qtbot.addWidget(search)
