@@ -175,6 +175,16 @@ def _frame(record: Record, layers: Layers) -> Frame:
     )
 
 
+def black_in_viewers(bits: int) -> str:
+    """What a person is to know of PNGs with numbers of so many bits; empty: nothing, they fill the file's."""
+    if bits in (8, 16):
+        return ""
+    return (
+        f"{bits}-bit numbers, 0 to {2**bits - 1}, in PNGs of 16 bits: they are the sensor's own, and ordinary viewers, "
+        "which take 65535 for white, show them almost black"
+    )
+
+
 def encode_png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
     """The bytes of a PNG file of (h, w) pixels. InputError: it cannot be one."""
     import cv2

@@ -13,6 +13,7 @@ from studio.commands.study import shard_of
 from studio.dataset.contact_sheet import write_contact_sheet
 from studio.dataset.folder import images_in
 from studio.dataset.formats import FORMATS, write_format
+from studio.dataset.image_kind import notes_of_depth
 from studio.dataset.recipe import Recipe, ready_made
 from studio.dataset.run import Wanted, make_dataset
 from studio.runtime.console import print_table, stage_progress
@@ -94,5 +95,7 @@ def make_images(
     for reason, times in sorted(result.rejected.items()):
         print(f"{times} scenes drawn anew: {reason}", file=sys.stderr)
     print(f"{result.images} images, {result.made} scenes made now\nwrote {folder}")
+    for note in notes_of_depth(result.dataset.recipe, result.dataset.base):
+        print(note)
     for path in written:
         print(f"wrote {path}")

@@ -13,7 +13,7 @@ import numpy as np
 from render.base.arrays import Float
 from render.base.files import atomic_write
 from render.base.threads import Cancel, thread_count
-from render.frame import LaserCurve
+from render.frame import Axis
 from render.run import never
 from studio.dataset.images import photograph, rendered
 from studio.dataset.recipe import Recipe, base_of
@@ -30,13 +30,23 @@ SIDE = 200
 
 
 @dataclass(frozen=True)
+class Curve:
+    """An exact line in the pixels of a picture, as of `LaserCurve`."""
+
+    axis: Axis
+    index: Float
+    position: Float
+
+
+@dataclass(frozen=True)
 class Picture:
     """A scene, small."""
 
     number: int
+    """Of the scene, or of the image in a folder."""
     values: Float
     """(h, w) from 0 to 1: the root of the photograph's numbers, so that dark parts show."""
-    curves: tuple[LaserCurve, ...]
+    curves: tuple[Curve, ...]
     rejected: tuple[str, ...]
     """Why attempts before it were drawn anew."""
 
@@ -70,7 +80,8 @@ def _picture(scene: Scene, cancelled: Cancel) -> Picture:
     frame = rendered(scene, cancelled)
     pixels = photograph(scene.projects[0], frame, None).astype(np.float64)
     values = np.sqrt(pixels / max(float(pixels.max()), 1.0))
-    return Picture(scene.number, values, tuple(frame.curves), scene.rejected)
+    curves = tuple(Curve(one.axis, one.index.astype(np.float64), one.position) for one in frame.curves)
+    return Picture(scene.number, values, curves, scene.rejected)
 
 
 def write_contact_sheet(

@@ -21,6 +21,7 @@ from typing import Any
 
 from render.base.errors import InputError
 from render.base.files import atomic_write, read_bytes, remove_all_unfinished, sha256
+from studio.dataset.image_kind import image_kind, notes_of_depth
 from studio.dataset.images import IMAGES, LABELS, MAPS, OBJECTS, images_of, name_of
 from studio.dataset.recipe import Recipe
 from studio.project.project import Project
@@ -203,6 +204,8 @@ def _card(dataset: Dataset, count: int, splits: Counter[str], reasons: Counter[s
         f"- split by scene: {', '.join(f'{name} {splits[name]}' for name in sorted(splits))}",
         f"- base project: {recipe.base}, image scale {recipe.image_scale:g}, seed {recipe.seed}",
         *_scale_note(recipe.image_scale),
+        f"- image size and depth: {image_kind(recipe, dataset.base)}",
+        *(f"- {note}" for note in notes_of_depth(recipe, dataset.base)),
         f"- made by Blazer Studio {version('blazer-studio')}; recipe and base SHA-256 {dataset.digest}",
         "- line positions are exact for the meshes, at scan-line centres; sigma_floor is the Cramer-Rao bound of shot, "
         "read and quantisation noise without speckle, px",

@@ -41,8 +41,11 @@ JUMP = 5.0
 """px of the shrunk image from one scan line to the next, that a chain's piece ends at."""
 NEAR = 3.0
 """Sigmas of the ridge's own filter within which another maximum is a part of it."""
-COLOURFUL = 0.5
-"""Share of the light that one channel must have for a line that is seen best without colours to have one."""
+COLOURFUL = 0.43
+"""Share of the light that one channel must have for a line that is seen best without colours to have one: a grey line
+has a third of it in each, lamp light that no white balance has corrected up to 0.42 in one; a laser's line had 0.48 and
+more, as a camera's own light beside its core is as grey as that.
+"""
 TIE = 0.1
 """Relative difference of scores below which the simpler combination, with the less noise, is taken."""
 WEAK = 0.5
@@ -130,6 +133,8 @@ class Evidence:
     """Of the laser: the combination's, or that of most of its light where another channel shows it more clearly."""
     clearest: dict[Axis, float]
     """By axis, of the combination that shows the line best: its score, or that of a second line that hides it."""
+    light: dict[Colour, float] | None = None
+    """Of the line's light, each channel's share; None: nothing told it, or the colour was given."""
 
     @property
     def score(self) -> float:
@@ -173,6 +178,19 @@ class Evidence:
         clearer = by_name[self.combination.name] < max(by_name.values())
         return f"; {self.combination.name} is as clear as that, with less noise" if clearer else ""
 
+    @property
+    def _searched(self) -> str:
+        name = self.combination.name
+        return f"{name}, all channels together" if name == "mono" and len(self.scores[self.axis]) > 1 else name
+
+    def _coloured(self) -> str:
+        """Its colour, and by what light."""
+        if self.light is None:
+            return self.colour
+        of_light = ", ".join(f"{colour} {share:.0%}" for colour, share in self.light.items())
+        grey = ": none has much more than the others" if self.colour == "mono" else ""
+        return f"{self.colour} (of the line's light {of_light}{grey})"
+
     def told(self) -> list[tuple[str, str]]:
         """(what, choice and reason) for a person."""
         axis = self.axis
@@ -182,8 +200,8 @@ class Evidence:
         reason = ", ".join(f"{name} {score:.2f}" for name, score in ranked) if len(by_name) > 1 else "given"
         found = [
             ("scan axis", f"{axis} ({axis_reason})"),
-            ("laser's colour", self.colour),
-            ("looked for in", f"{self.combination.name} ({reason}{self._why(by_name)})"),
+            ("laser's colour", self._coloured()),
+            ("looked for in", f"{self._searched} ({reason}{self._why(by_name)})"),
         ]
         if self.lines == 2:
             found.append(("lines", f"a second line stands out (evidence {self.score:.2f} and {self.second:.2f})"))
@@ -225,8 +243,9 @@ def find_evidence(
     best = best_of[best_axis]
     both = [chains_of(one, best, best_axis, 2) for one in shrunk]
     lines = [pair[0] for pair in both]
-    seen = best.colour if mono or colour is not None else _colour_of(shrunk, lines, best, best_axis)
-    return Evidence(best_axis, best, scores, tuple((pair[0], pair[1]) for pair in both), seen, clearest)
+    light = None if mono or colour is not None else _light_of(shrunk, lines, best_axis)
+    seen = best.colour if light is None else _colour_of(light, best)
+    return Evidence(best_axis, best, scores, tuple((pair[0], pair[1]) for pair in both), seen, clearest, light)
 
 
 def _simplest_of_best(allowed: Sequence[Combination], scores: dict[str, float]) -> Combination:
@@ -242,8 +261,8 @@ def _clearest(shrunk: Sequence[Shrunk], combination: Combination, axis: Axis, sc
     return second if second > SECOND else score
 
 
-def _colour_of(shrunk: Sequence[Shrunk], lines: Sequence[Chain], combination: Combination, axis: Axis) -> Colour:
-    """The channel with most light along the lines, above that beside them; clipped pixels do not say."""
+def _light_of(shrunk: Sequence[Shrunk], lines: Sequence[Chain], axis: Axis) -> dict[Colour, float] | None:
+    """Each channel's share of the light along the lines, above that beside them; clipped pixels do not say."""
     light = np.zeros(3)
     for one, chain in zip(shrunk, lines, strict=True):
         image, saturated, factor = one.image, one.saturated, one.factor
@@ -255,12 +274,18 @@ def _colour_of(shrunk: Sequence[Shrunk], lines: Sequence[Chain], combination: Co
         off = np.abs(x - ((chain.u[there] + 0.5) / factor - 0.5)[:, None]) / (chain.scale[there] / factor)[:, None]
         for row, distance in zip(there, off, strict=True):
             near, beside = (distance < NEAR) & ~full[row], (distance > 2.0 * NEAR) & (distance < 4.0 * NEAR)
+            if not beside.any():  # a narrow rectangle ends before
+                beside = distance > NEAR
             if near.any() and beside.any():
                 light += turned[row][near].mean(axis=0) - turned[row][beside].mean(axis=0)
-    best = int(np.argmax(light))
-    if combination.colour == "mono" and light[best] < COLOURFUL * float(light.sum()):
-        return "mono"
-    return COLOURS[best]
+    above = np.maximum(light, 0.0)
+    return dict(zip(COLOURS, (above / above.sum()).tolist(), strict=True)) if above.any() else None
+
+
+def _colour_of(light: dict[Colour, float], combination: Combination) -> Colour:
+    """The channel with most of the line's light."""
+    most = max(COLOURS, key=lambda colour: light[colour])
+    return "mono" if combination.colour == "mono" and light[most] < COLOURFUL else most
 
 
 def shrink(image: NDArray[Any], off: NDArray[Any] | None, closed: NDArray[np.bool_] | None = None) -> Shrunk:

@@ -58,6 +58,18 @@ def ask_unsaved(parent: QWidget, name: str, more: str = "") -> Answer:
     return {button.Save: "save", button.Discard: "discard"}.get(button(chosen), "cancel")  # type: ignore[return-value]
 
 
+def ask_to_save_first(parent: QWidget, name: str, why: str) -> bool:
+    """Whether to save the project now, without which something else cannot be; why: a sentence."""
+    box = QMessageBox(QMessageBox.Icon.Question, "Save the project first", f"Save “{name}” first?", parent=parent)
+    box.setObjectName("save-first")
+    box.setInformativeText(why)
+    save = box.addButton("Save the project", QMessageBox.ButtonRole.AcceptRole)
+    box.setEscapeButton(box.addButton("Cancel", QMessageBox.ButtonRole.RejectRole))
+    box.setDefaultButton(save)
+    box.exec()
+    return box.clickedButton() is save
+
+
 def ask_changed_on_disk(parent: QWidget, path: Path) -> Literal["over", "elsewhere", "cancel"]:
     """What to do with a file that another window or program has written since it was opened or saved here."""
     title, question = "Changed on disk", f"Save over “{path.name}”, which was changed since?"

@@ -85,6 +85,8 @@ class Session(QObject):
     """The shown render was developed and measured again (power, exposure, method)."""
     render_asked = Signal()
     """A panel other than the render panel asks for a render with the present settings."""
+    save_asked = Signal()
+    """The project is to be saved, which may ask a person where; when the signal has been heard, it is or is not."""
     results_asked = Signal(object)
     """The scan in a folder is to be opened."""
     problems_changed = Signal()

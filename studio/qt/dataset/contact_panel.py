@@ -1,4 +1,5 @@
-"""The contact sheet: the first scenes of the recipe, small, as they become ready, each with its exact line."""
+"""The contact sheet: the first scenes of the recipe as they become ready, or images that were written, with their exact
+lines."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ from PySide6.QtGui import QColor, QHelpEvent, QHideEvent, QImage, QPainter, QPai
 from PySide6.QtWidgets import QLabel, QSizePolicy, QToolTip, QVBoxLayout, QWidget
 
 from studio.dataset.contact_sheet import Picture
+from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.session import Session, one_of
 from studio.qt.dataset.dataset_work import DatasetWork
 
@@ -23,6 +25,10 @@ class ContactPanel(QWidget):
         super().__init__(parent)
         self.work = one_of(DatasetWork, session)
         self.sheet = Sheet(self.work)
+        self.choice = ChoiceBox()
+        self.choice.addItems(("Preview of the recipe", "Images in the folder"))
+        self.choice.setAccessibleName("What the sheet shows")
+        self.choice.setToolTip("The scenes that a run would make, or the first images that are there")
         self.told = QLabel(wordWrap=True)
         self.told.setObjectName("muted")
         self.problem = QLabel(wordWrap=True)
@@ -30,9 +36,11 @@ class ContactPanel(QWidget):
         self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 8, 8, 8)
+        layout.addWidget(self.choice, 0, Qt.AlignmentFlag.AlignLeft)
         layout.addWidget(self.problem)
         layout.addWidget(self.sheet, 1)
         layout.addWidget(self.told)
+        self.choice.activated.connect(lambda number: self.work.show_written(number == 1))
         self.work.pictures_changed.connect(self._follow)
         self._follow()
 
@@ -48,14 +56,27 @@ class ContactPanel(QWidget):
         work = self.work
         self.problem.setText(work.problem)
         self.problem.setVisible(bool(work.problem))
+        self.choice.setVisible(bool(work.written))
+        self.choice.setCurrentIndex(1 if work.shows_written else 0)
+        self.told.setText(self._written() if work.shows_written else self._previewed())
+        self.sheet.update()
+
+    def _written(self) -> str:
+        work = self.work
+        count, name = len(work.written), "" if work.folder is None else work.folder.name
+        which = "The image" if count == 1 else f"The first {count} images"
+        line = "The exact line of their labels is drawn on the upper half"
+        return f"{which} of the folder {name}, as written. {line}, and dark parts are brightened."
+
+    def _previewed(self) -> str:
+        work = self.work
         anew = sum(len(picture.rejected) for picture in work.pictures.values())
         of_all = work.previewed
         made = sum(number < of_all for number in work.pictures)
         which = f"the first {of_all} scenes of the recipe" if of_all < work.scenes else f"the {of_all} scenes"
         drawn = f"Preview: {which}" + (f", {made} of them so far" if made < of_all else "")
         again = f"; {anew} were drawn anew, as they showed no line" if anew else ""
-        self.told.setText(f"{drawn}{again}. The exact line is drawn on the upper half.")
-        self.sheet.update()
+        return f"{drawn}{again}. The exact line is drawn on the upper half."
 
 
 class Sheet(QWidget):
@@ -73,7 +94,7 @@ class Sheet(QWidget):
 
     def place(self, number: int) -> QRectF:
         """Where the picture of a scene stands."""
-        picture = next(iter(self.work.pictures.values()), None)
+        picture = next(iter(self.work.on_sheet.values()), None)
         height, width = picture.values.shape if picture is not None else (5, 6)
         columns = self._columns(width / height)
         cell = (self.width() - GAP * (columns - 1)) / columns
@@ -84,9 +105,10 @@ class Sheet(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        for number in range(self.work.previewed):
+        pictures = self.work.on_sheet
+        for number in range(self.work.places):
             place = self.place(number)
-            picture = self.work.pictures.get(number)
+            picture = pictures.get(number)
             if picture is None:
                 painter.fillRect(place, self.palette().alternateBase())
             else:
@@ -94,21 +116,22 @@ class Sheet(QWidget):
 
     def event(self, event: QEvent) -> bool:
         if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
-            for number, picture in self.work.pictures.items():
+            for number, picture in self.work.on_sheet.items():
                 if self.place(number).contains(QPointF(event.pos())):
                     anew = f"; drawn anew: {', '.join(picture.rejected)}" if picture.rejected else ""
-                    QToolTip.showText(event.globalPos(), f"scene {number}{anew}", self)
+                    what = "image" if self.work.shows_written else "scene"
+                    QToolTip.showText(event.globalPos(), f"{what} {picture.number}{anew}", self)
                     return True
         return super().event(event)
 
     def _columns(self, aspect: float) -> int:
         """As few as let all pictures fit into the height."""
-        for columns in range(1, self.work.previewed + 1):
-            rows = -(-self.work.previewed // columns)
+        for columns in range(1, self.work.places + 1):
+            rows = -(-self.work.places // columns)
             cell = (self.width() - GAP * (columns - 1)) / columns
             if rows * cell / aspect + GAP * (rows - 1) <= self.height():
                 return columns
-        return self.work.previewed
+        return self.work.places
 
 
 def _paint(painter: QPainter, place: QRectF, picture: Picture) -> None:

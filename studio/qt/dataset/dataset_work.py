@@ -15,9 +15,11 @@ from render.base.files import atomic_write
 from render.base.threads import Cancel
 from studio.dataset.contact_sheet import Picture, pictures
 from studio.dataset.folder import images_in, is_of
+from studio.dataset.image_kind import image_kind, notes_of_depth
 from studio.dataset.own_recipe import check_place, recipe_of, suggested_draw
 from studio.dataset.recipe import Recipe, base_of
 from studio.dataset.run import Result, Wanted, make_dataset
+from studio.dataset.written import written_pictures
 from studio.editing.forms import FieldSpec
 from studio.project.document import FieldPath
 from studio.project.project import Project
@@ -34,6 +36,8 @@ REST_MS = 400
 """Without a change before the scenes are drawn anew."""
 SHOWN = 24
 """Scenes on the live sheet."""
+AGAIN_MS = 3000
+"""Until a folder that is being filled is looked into again."""
 FIRST = "primitives"
 
 
@@ -62,12 +66,18 @@ class DatasetWork(LongWork):
         self.pictures: dict[int, Picture] = {}
         """Of `recipe` as it is, by their numbers, as far as they are ready."""
         self.drawing = False
+        self.written: list[Picture] = []
+        """The first images of the folder."""
+        self.shows_written = False
+        """They are on the sheet, and not the recipe's scenes."""
         self.problem = ""
         """Why the scenes cannot be drawn, or the run could not go on."""
         self._stale = True
         self._rest = QTimer(self, singleShot=True, interval=REST_MS)
         self._rest.timeout.connect(self.draw)
         self._ready.connect(self._take_picture)
+        self._again = QTimer(self, interval=AGAIN_MS)
+        self._again.timeout.connect(self.read_written)
         self._read_base()
 
     def load(self, path: Path | str) -> None:
@@ -156,8 +166,33 @@ class DatasetWork(LongWork):
 
     def choose_folder(self, folder: Path) -> None:
         """Where the images go; a dataset of this recipe that is there is gone on with."""
-        self.folder = folder
+        self.folder, self.written, self.shows_written = folder, [], False
         self.state_changed.emit()
+        self.read_written()
+
+    def show_written(self, on: bool) -> None:
+        """The images of the folder on the sheet, or the recipe's scenes."""
+        self.shows_written = on and bool(self.written)
+        self.pictures_changed.emit()
+        if not self.shows_written and self.watched:
+            self.look()
+
+    def read_written(self, *, show: bool = False) -> None:
+        """The first images that the folder holds now; show: on the sheet."""
+        folder, count = self.folder, self.shown
+
+        def work(progress: Progress, cancelled: Cancel) -> list[Picture]:
+            if folder is None or not folder.is_dir():
+                return []
+            return list(written_pictures(folder, images_in(folder)[:count], cancelled))
+
+        def then(found: list[Picture]) -> None:
+            if folder == self.folder:
+                self.written = found
+                self.shows_written = bool(found) and (show or self.shows_written)
+                self.pictures_changed.emit()
+
+        self.unseen.run("written", "written images", work, then, interrupt=True)
 
     def choose_count(self, scenes: int) -> None:
         """More than are drawn of them draw the others; fewer are looked at without drawing any."""
@@ -173,6 +208,21 @@ class DatasetWork(LongWork):
     def previewed(self) -> int:
         """Scenes that are looked at: the first ones, and no more than are asked for."""
         return min(self.shown, self.scenes)
+
+    @property
+    def on_sheet(self) -> dict[int, Picture]:
+        """By their places, as far as they are ready."""
+        return dict(enumerate(self.written)) if self.shows_written else self.pictures
+
+    @property
+    def places(self) -> int:
+        """Of the sheet."""
+        return len(self.written) if self.shows_written else self.previewed
+
+    @property
+    def kind(self) -> str:
+        """Size and bits of the images; empty: the base project cannot be read."""
+        return "" if self.base is None else image_kind(self.recipe, self.base)
 
     def made(self) -> int:
         """Images that the folder holds whole."""
@@ -201,10 +251,12 @@ class DatasetWork(LongWork):
                 return in_window(error)
 
         self._tell("")
+        self._again.start()
         self._begin(work, self._take_end)
 
     def close(self) -> None:
         self._rest.stop()
+        self._again.stop()
         self.unseen.close()
 
     def _replace(self, number: int, values: dict[str, object]) -> None:
@@ -226,7 +278,9 @@ class DatasetWork(LongWork):
             self._change(recipe)
 
     def _change(self, recipe: Recipe) -> None:
-        self.recipe, self._stale = recipe, True
+        self.recipe, self._stale, self.shows_written = recipe, True, False
+        if self.folder is None:
+            self.written = []
         self._read_base()
         self.recipe_changed.emit()
         if self.watched:
@@ -247,11 +301,17 @@ class DatasetWork(LongWork):
         self.drawing = False
         self._tell(problem)
 
+    def _after_run(self) -> None:
+        self._again.stop()
+        self.read_written(show=self.is_of_recipe())
+
     def _take_end(self, ended: Result | str) -> None:
         if isinstance(ended, str):
             self._tell(ended)
         else:
-            self.session.message.emit("info", f"The dataset is done: {ended.images} images in {self.folder}")
+            told = f"The dataset is done: {ended.images} images in {self.folder}"
+            dataset = ended.dataset
+            self.session.message.emit("info", "\n".join([told, *notes_of_depth(dataset.recipe, dataset.base)]))
 
     def _tell(self, problem: str) -> None:
         self.problem = problem

@@ -169,7 +169,8 @@ class RecipePanel(QWidget):
         images = work.scenes * images_of(work.recipe, len(work.base.scene.lasers) if work.base is not None else 1)
         whole = there >= images and work.is_of_recipe()
         told = f"; {there} are there" if there else ""
-        self.told.setText(f"{images} images of {work.scenes} scenes{told}{ALL_THERE if whole else ''}")
+        kind = f", {work.kind}" if work.kind else ""
+        self.told.setText(f"{images} images of {work.scenes} scenes{kind}{told}{ALL_THERE if whole else ''}")
         self.foot.show_state(work.folder, work.job, begun=there > 0)
         self.foot.run.setEnabled(not whole)
         self.foot.run.setToolTip(f"Every image is there{ALL_THERE}" if whole else "")

@@ -24,7 +24,6 @@ from PySide6.QtWidgets import (
 )
 
 from analysis.line.result import CAUTIOUS
-from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.output.tone_mapping import Picture, pyramid
 from studio.calibration.drawings import levels_of
@@ -32,7 +31,6 @@ from studio.calibration.image_views import SUFFIXES
 from studio.photographs.laser_light import Channel
 from studio.photographs.measured_set import MeasuredSet, measured_set
 from studio.photographs.photograph_set import Wishes
-from studio.photographs.region import Region, region_of
 from studio.qt.core import theme
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.drops import accept_copy, dragged_files
@@ -40,6 +38,7 @@ from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import ShareBar, text_button
 from studio.qt.image.image_item import PictureView
+from studio.qt.image.photograph_rectangle import PhotographRectangle
 from studio.qt.image.zooms import Zooms
 from studio.runtime.jobs import Job, Progress
 from studio.scan.frame_views import picture, views
@@ -83,8 +82,6 @@ class PhotographWindow(QWidget):
         self.clear_button = text_button("Clear", "Start again with other photographs")
         self.off_button = text_button("Laser off…", "One for all photographs, or one each by name or order")
         self.off_told = QLabel("none")
-        self.limited = QCheckBox("Only within the rectangle")
-        self.limited.setToolTip("Drag the rectangle and its corners in the photograph")
         self.measure_button = text_button("Measure", "The line in all photographs of the set", "primary")
         self.bar = ShareBar()
         self.old, self.told, self.chosen, self.problem = QLabel(OLD), QLabel(EMPTY), QLabel(), QLabel()
@@ -95,17 +92,16 @@ class PhotographWindow(QWidget):
         self.problem.setObjectName("error")
         self.chosen.setObjectName("muted")
         self.view, self.rendered = PictureView(), PictureView()
+        self.rectangle = PhotographRectangle(self.view)
         self.bright = QCheckBox("Brighten")
         self.bright.setToolTip("Square root of the light, to see what is faint; photographs come so")
         self.bright.setChecked(True)
         self.no_render = QLabel(NO_RENDER)
         self.no_render.setObjectName("muted")
         self.sure, self.doubtful = (pg.ScatterPlotItem(size=3, pen=None) for _ in range(2))
-        self.region = pg.RectROI((0, 0), (1, 1), sideScalers=True)
-        for item in (self.sure, self.doubtful, self.region):
+        for item in (self.sure, self.doubtful):
             item.setZValue(10)
             self.view.box.addItem(item, ignoreBounds=True)
-        self.region.setVisible(False)
         self._lay_out()
         self._connect()
         self._refresh()
@@ -128,7 +124,7 @@ class PhotographWindow(QWidget):
         self.paths, self.offs, self.found, self._asked_for, self._fitted = [], [], None, None, (0, 0)
         self.names.clear()
         self.view.item.set_levels([])
-        self.limited.setChecked(False)
+        self.rectangle.clear()
         self._refresh()
         self._show_line()
 
@@ -138,23 +134,19 @@ class PhotographWindow(QWidget):
         self._refresh()
 
     def wishes(self) -> Wishes:
-        """As the controls have it. InputError: a rectangle without pixels."""
+        """As the controls have it."""
         colour: Any = self.colour.currentText()
         axis: Any = self.axis.currentText()
         colour, axis = (None if value == AUTO else value for value in (colour, axis))
         channel: Channel | None = "mono" if colour == "mono" else None
-        return Wishes(axis=axis, colour=colour, channel=channel, off=tuple(self.offs), region=self._region())
+        return Wishes(axis=axis, colour=colour, channel=channel, off=tuple(self.offs), region=self.rectangle.region())
 
     def measure(self) -> None:
         """The line in all photographs, on a thread."""
         if not self.paths:
             return
         self.problem.clear()
-        try:
-            paths, wishes = list(self.paths), self.wishes()
-        except InputError as error:
-            self.problem.setText(str(error))
-            return
+        paths, wishes = list(self.paths), self.wishes()
         self._asked_for = paths, wishes
         self._show_age()
 
@@ -197,15 +189,6 @@ class PhotographWindow(QWidget):
         for view in (self.view, self.rendered):
             view.setBackground(theme.colours().base)
 
-    def _region(self) -> Region:
-        if not self.limited.isChecked():
-            return Region()
-        width, height = self.view.item.size
-        (x, y), (w, h) = self.region.pos(), self.region.size()
-        left, top = max(0, round(x + 0.5)), max(0, round(y + 0.5))
-        right, bottom = min(width, round(x + w + 0.5)), min(height, round(y + h + 0.5))
-        return region_of(f"{left},{top},{max(right - left, 1)},{max(bottom - top, 1)}", None)
-
     def _lay_out(self) -> None:
         form = QFormLayout()
         form.addRow("Colour", self.colour)
@@ -232,7 +215,7 @@ class PhotographWindow(QWidget):
         results.setFrameShape(QScrollArea.Shape.NoFrame)
         results.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         results.setWidget(texts)
-        for widget in (self.limited, self.measure_button, self.bar):
+        for widget in (self.rectangle, self.measure_button, self.bar):
             left.addWidget(widget)
         left.addWidget(results, 2)
         controls = QWidget()
@@ -269,8 +252,7 @@ class PhotographWindow(QWidget):
         self.clear_button.clicked.connect(self.clear)
         self.off_button.clicked.connect(self._ask_off)
         self.measure_button.clicked.connect(self.measure)
-        self.limited.toggled.connect(self._limit)
-        for signal in (self.colour.currentIndexChanged, self.axis.currentIndexChanged, self.region.sigRegionChanged):
+        for signal in (self.colour.currentIndexChanged, self.axis.currentIndexChanged, self.rectangle.changed):
             signal.connect(lambda *_: self._show_age())
         self.bright.toggled.connect(lambda on: self._show_rendered())
         self.names.currentRowChanged.connect(lambda row: self._show())
@@ -293,21 +275,9 @@ class PhotographWindow(QWidget):
         folder = str(self.paths[-1].parent) if self.paths else ""
         return [Path(name) for name in QFileDialog.getOpenFileNames(self, title, folder, FILTER.format(kinds))[0]]
 
-    def _limit(self, on: bool) -> None:
-        width, height = self.view.item.size
-        if on and self.region.size().x() <= 1.0:
-            self.region.setPos((0.25 * width, 0.25 * height))
-            self.region.setSize((0.5 * width, 0.5 * height))
-        self.region.setVisible(on)
-        self._show_age()
-
     def _show_age(self) -> None:
         """Whether the figures are of what is set."""
-        try:
-            old = self.found is not None and self._asked_for != (self.paths, self.wishes())
-        except InputError:
-            old = True
-        self.old.setVisible(old)
+        self.old.setVisible(self.found is not None and self._asked_for != (self.paths, self.wishes()))
 
     def _refresh(self) -> None:
         self.measure_button.setEnabled(bool(self.paths))
@@ -331,6 +301,7 @@ class PhotographWindow(QWidget):
             if self._shown() != path:
                 return
             self.view.item.set_levels(levels)
+            self.rectangle.follow_picture()
             if self._fitted != self.view.item.size:
                 self._fitted = self.view.item.size
                 self.view.fit()

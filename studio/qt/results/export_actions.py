@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from analysis.line.settings import Method
 from analysis.report.colour import method_name
 from render.base.threads import Cancel
+from render.output.frame_files import black_in_viewers
 from studio.qt.core.actions import Actions
 from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.jobs import RENDER, JobRunner
@@ -146,6 +147,8 @@ class ExportActions(QObject):
             if kind == "height map":  # nobody was asked about the file beside the picture
                 check_replaceable([path.with_suffix(".json")])
             written = export.export_unless(cancelled, writer, path, what)
+            if kind == "image" or (kind == "frame" and len(what.images) == 1):
+                known.extend(filter(None, [black_in_viewers(what.images[0].bits)]))
             if kind == "height map" and (beyond := left_out_of(written[1])):
                 left_out.append(f"{beyond} {KEEP_ALL}")
             return written
@@ -154,6 +157,7 @@ class ExportActions(QObject):
         if kind == "report":
             notes = (*notes, *logo_remarks(now, self.session.document.root))
         left_out: list[str] = []
+        known: list[str] = []
 
         def then(written: list[Path]) -> None:
             if kind == "report" and whole is None:
@@ -161,7 +165,7 @@ class ExportActions(QObject):
             method = (how.project if whole is None else scan_steps(self.session).measured_as(render)).extraction.method
             own = "the project's own method" if whole is None else "as the scan was measured last"
             said = f", the points by {method_name(method)}, {own}" if kind == "points" else ""
-            self._tell(written, said + (f", of {of}" if of else ""), (*notes, *left_out))
+            self._tell(written, said + (f", of {of}" if of else ""), (*notes, *left_out), known)
 
         self._tell_wait(path)
         job = self.runner.run(LANE, f"export {path.name}", work, then, in_turn=True)
@@ -207,9 +211,10 @@ class ExportActions(QObject):
         if job in self._jobs:
             self.session.message.emit("info", f"Cancelled: {job.name}. No file was written")
 
-    def _tell(self, written: list[Path], of: str, notes: tuple[str, ...]) -> None:
+    def _tell(self, written: list[Path], of: str, notes: tuple[str, ...], known: Sequence[str]) -> None:
+        """known: what is so as ever, and no warning."""
         names = ", ".join(str(path) for path in written) + of
-        self.session.message.emit("warning" if notes else "info", "\n".join([f"Wrote {names}", *notes]))
+        self.session.message.emit("warning" if notes else "info", "\n".join([f"Wrote {names}", *notes, *known]))
 
 
 def _is_there(what: str, render: Render) -> bool:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtGui import QColor, QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QDialog, QLineEdit, QListWidget, QListWidgetItem, QMenu, QVBoxLayout
+from PySide6.QtWidgets import QDialog, QDockWidget, QLineEdit, QListWidget, QListWidgetItem, QMenu, QVBoxLayout
 
 from analysis.gauges.gauge import TITLES, Kind
 from analysis.report.gauge_table import DEFINITIONS
@@ -25,11 +25,32 @@ if TYPE_CHECKING:
 NOTHING = "Nothing found: no command and no field has these letters"
 SIZE = (560, 420)
 PASSED_ON = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
+WORDS = {
+    "setup": "workspace design choose select lens camera laser place arrange accuracy speed working range",
+    "render_workspace": "workspace image picture simulate light",
+    "measure": "workspace results points error accuracy dimensions inspect",
+    "study": "workspace compare choose sweep vary methods accuracy speed limits",
+    "calibrate": "workspace lens distortion board checkerboard intrinsics",
+    "dataset": "workspace training labels annotations images machine learning network",
+    "Design": "choose lens accuracy speed resolution baseline angle working range focus depth noise",
+    "preferences": "settings options",
+    "theme_dark": "colours appearance night",
+    "import_mesh": "CAD part model load",
+    "expose": "brightness dark bright saturated",
+    "scan": "conveyor turntable speed all frames",
+    "photographs": "real camera phone rectangle region",
+    "deviation": "compare CAD tolerance surface",
+    "heights": "depth range image topography",
+    "shortcuts": "keys keyboard",
+}
+"""What else a person may call a command, by its key, or a panel, by its title."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """What can be chosen. text: as the list shows it, "Scene > Add > Sphere"; more: what tells of it besides."""
+    """What can be chosen. text: as the list shows it, "Scene > Add > Sphere"; more: what tells of it besides; words:
+    what else a person may call it.
+    """
 
     name: str
     text: str
@@ -38,6 +59,7 @@ class Entry:
     possible: bool
     act: Callable[[], object]
     is_field: bool = False
+    words: str = ""
 
 
 class CommandSearch(QDialog):
@@ -73,7 +95,7 @@ class CommandSearch(QDialog):
         """What fits, the best first."""
         self.list.clear()
         muted = QColor(theme.colours().muted)
-        texts = [(entry.name, entry.more) for entry in self.entries]
+        texts = [(f"{entry.name} {entry.words}", entry.more) for entry in self.entries]
         for i in found(typed, texts):
             entry = self.entries[i]
             if entry.is_field and not typed.strip():
@@ -124,7 +146,11 @@ def entries(window: MainWindow) -> list[Entry]:
             elif name and not action.isSeparator():
                 keys = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
                 text, tip = f"{path} > {name}" + (f"   {keys}" if keys else ""), action.statusTip()
-                listed.append(Entry(name, text, f"{path} {tip}", tip, action.isEnabled(), action.trigger))
+                words, dock = WORDS.get(action.objectName() or name, ""), action.parent()
+                # who looks for a panel that is there wants to see it, and its entry in the menu would close it
+                there = isinstance(dock, QDockWidget) and not dock.isHidden()
+                act = partial(window.show_panel, dock.objectName()) if there and dock is not None else action.trigger
+                listed.append(Entry(name, text, f"{path} {tip}", tip, action.isEnabled(), act, words=words))
 
     for action in window.menuBar().actions():
         menu = action.menu()

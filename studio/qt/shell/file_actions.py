@@ -123,6 +123,7 @@ class FileActions(QObject):
         self._regular.start()
         self._keeps = True
         session.project_changed.connect(self._rest.start)
+        session.save_asked.connect(self.save)
         session.results_asked.connect(lambda folder: self.open_results(folder))
 
     @property

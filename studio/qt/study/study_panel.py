@@ -19,8 +19,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from render.base.errors import InputError
 from studio.qt.core.boxes import ChoiceBox, DecimalBox, WholeBox
-from studio.qt.core.dialogs import choose_file
+from studio.qt.core.dialogs import ask_to_save_first, choose_file
 from studio.qt.core.folders import ask_results_folder
 from studio.qt.core.icons import icon_button
 from studio.qt.core.jobs import JobRunner, duration
@@ -31,11 +32,17 @@ from studio.qt.core.widgets import Scrolled, align_labels, flush, text_button
 from studio.qt.study.study_work import StudyWork
 from studio.qt.study.sweep_editor import SweepEditor
 from studio.runtime.jobs import Job
-from studio.study.draft import new_sweep, varies_nothing
+from studio.study.draft import by_names, new_sweep, varies_nothing
 from studio.study.estimate import Estimate
+from studio.study.folder_run import in_window
 from studio.study.study import Study, ready_made
+from studio.study.study_file import check_base, waits_for_project
 
 EMPTY = "What it takes is told here as soon as every sweep varies a field."
+NAMES_PROJECT = (
+    "A study's file names that of its project, and this project is in no file as it is now. Save the study beside it "
+    "then, or in a folder above."
+)
 FILES = "Studies (*.json);;All files (*)"
 
 
@@ -165,11 +172,30 @@ class StudyPanel(QWidget):
             self.work.open_folder(Path(chosen))
 
     def _save(self) -> None:
+        if not self._may_be_saved():
+            return
         suggestion = str(self.session.place / f"{self.work.draft['name']}.json")
         chosen, _ = QFileDialog.getSaveFileName(self, "Save the study", suggestion, FILES)
         if chosen:
             self.session.chose(Path(chosen))
             self.work.save(Path(chosen))
+
+    def _may_be_saved(self) -> bool:
+        """Before a person is asked where: there is a study, and a file of the project that it can name."""
+        work, session = self.work, self.session
+        try:
+            base = work.study().base
+            if waits_for_project(base, session.document, work.loaded):
+                if not ask_to_save_first(self.window(), session.project.name, NAMES_PROJECT):
+                    return False
+                session.save_asked.emit()
+                if waits_for_project(base, session.document, work.loaded):
+                    return False  # nobody said where
+            check_base(base, session.document, work.loaded)
+        except InputError as error:
+            session.message.emit("warning", f"The study cannot be saved: {by_names(in_window(error), work.draft)}")
+            return False
+        return True
 
     def _add_sweep(self) -> None:
         work = self.work

@@ -18,6 +18,7 @@ from render.output.exr import decode_exr
 from studio.dataset.contact_sheet import write_contact_sheet
 from studio.dataset.folder import images_in, opened
 from studio.dataset.formats import FORMATS, run_lengths, write_format
+from studio.dataset.image_kind import image_kind, notes_of_depth
 from studio.dataset.images import rendered
 from studio.dataset.labels import OCCLUDED, VISIBLE, line_states
 from studio.dataset.recipe import Draw, Recipe, base_of
@@ -65,6 +66,19 @@ def test_three_shards_put_together_are_the_same_bytes(whole: Path, tmp_path: Pat
         make_dataset(RECIPE, Path(), Wanted(SCENES, Shard(k + 1, 3)), folder, engine=HERE)
     result = make_dataset(RECIPE, Path(), Wanted(SCENES, sources=shards), tmp_path / "all", engine=HERE)
     assert result.made == 0 and contents(tmp_path / "all") == contents(whole)
+
+
+def test_the_card_says_what_the_images_are_and_that_viewers_show_them_black(whole: Path) -> None:
+    image = cv2.imread(str(whole / "images/00000/00000000.png"), cv2.IMREAD_UNCHANGED)
+    card = (whole / "card.md").read_text()
+    assert f"- image size and depth: {image.shape[1]} x {image.shape[0]} px, 12 bit\n" in card
+    assert (
+        image.dtype == np.uint16 and image.max() <= 4095 and "- 12-bit numbers, 0 to 4095, in PNGs of 16 bits" in card
+    )
+    drawn = RECIPE.model_copy(update={"draw": (Draw(field="sensor.bits", kind="choice", values=(8, 10, 16)),)})
+    base = opened(whole).base
+    assert image_kind(drawn, base).endswith("px, 8 to 16 bit")
+    assert [note.split()[0] for note in notes_of_depth(drawn, base)] == ["10-bit"]
 
 
 @pytest.mark.parametrize("change", [{"files": {"../../stolen.png": "0"}}, {"rejected": None}, {"scene": "first"}, {}])

@@ -82,6 +82,34 @@ def test_colour_and_axis_are_told_by_the_photograph_and_the_line_is_found(name: 
     assert np.nanmedian(error) < 0.25
 
 
+@pytest.mark.parametrize("half", [100, 25, 15])
+@pytest.mark.parametrize("colour", [0, 1])
+def test_a_rectangle_about_the_line_says_its_colour_as_the_whole_photograph_does(half: int, colour: int) -> None:
+    """Without rivals all channels together show it best, and half of its light may be in the others."""
+    for scene in (Scene(colour=colour, crosstalk=0.55, room=20.0), Scene(colour=colour, peak=2500.0, room=30.0)):
+        image = photograph(scene, seed=1)
+        middle = int(scene.centre[100:160].mean())
+        part = np.ascontiguousarray(image[100:160, middle - half : middle + half])
+        whole, within = (find_evidence([shrink(one, None)]) for one in (image, part))
+        assert whole.colour == within.colour == ("red", "green")[colour]
+        assert within.combination.name == "mono" and within.light is not None
+        told = dict(within.told())
+        assert told["laser's colour"].startswith(f"{within.colour} (of the line's light ")
+        assert told["looked for in"].startswith("mono, all channels together (")
+
+
+@pytest.mark.parametrize("lamp", [(1.0, 1.0, 1.0), (1.0, 0.8, 0.6)])
+def test_a_line_of_grey_or_lamp_light_has_no_colour_and_says_what_light_it_has(lamp: tuple[float, ...]) -> None:
+    y, x = np.mgrid[0:200, 0:300].astype(np.float64)
+    line = 150.0 * np.exp(-0.5 * ((x - 140.0 - 0.1 * y) / 2.0) ** 2)
+    noise = np.random.default_rng(3).normal(size=(*x.shape, 3))
+    image = np.clip(np.rint(10.0 + line[..., None] * lamp + noise), 0, 255).astype(np.uint8)
+    evidence = find_evidence([shrink(image, None)])
+    assert evidence.colour == "mono" and evidence.light is not None
+    assert list(evidence.light.values()) == pytest.approx(np.divide(lamp, sum(lamp)), abs=0.005)
+    assert "none has much more than the others" in dict(evidence.told())["laser's colour"]
+
+
 def test_a_white_core_is_not_measured_in_the_difference_which_is_hollow(tmp_path: Path) -> None:
     scene = Scene(peak=2500.0, room=30.0)
     write(tmp_path / "a.png", photograph(scene, seed=1))

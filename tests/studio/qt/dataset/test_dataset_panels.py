@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from render.base.errors import InputError
 from studio.dataset.recipe import Draw, Recipe, ready_made
+from studio.dataset.run import Wanted, make_dataset
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session, one_of
@@ -150,13 +153,62 @@ def test_images_are_made_stopped_and_gone_on_with(desk: Desk, qtbot: QtBot, tmp_
     desk.panel.ask_and_run()
     qtbot.waitUntil(lambda: not desk.work.running)
     assert desk.work.made() == 4 and not desk.work.problem
-    assert desk.panel.told.text() == "4 images of 2 scenes; 4 are there; a higher number of scenes makes more"
+    assert desk.panel.told.text() == (
+        f"4 images of 2 scenes, {desk.work.kind}; 4 are there; a higher number of scenes makes more"
+    )
     assert not desk.panel.foot.run.isEnabled() and "Every image is there" in desk.panel.foot.run.toolTip()
     desk.panel.scenes.setValue(3)
     assert desk.panel.foot.run.text() == "Go on" and desk.panel.foot.run.isEnabled()
     desk.panel.ask_and_run()
     qtbot.waitUntil(lambda: not desk.work.running)
     assert desk.work.made() == 6
+
+
+def test_the_size_and_bits_of_the_images_stand_beside_their_number(desk: Desk) -> None:
+    assert desk.work.base is not None
+    camera = desk.work.base.scene.camera
+    small = f"{round(0.05 * camera.width)} x {round(0.05 * camera.height)} px, 12 bit"
+    assert desk.panel.told.text() == f"200 images of 100 scenes, {small}"
+    add_field(desk, "sensor.bits")
+    assert desk.panel.told.text().endswith("px, 8 to 16 bit")
+
+
+def test_images_that_were_written_are_shown_with_the_line_of_their_labels(
+    desk: Desk, qtbot: QtBot, tmp_path: Path
+) -> None:
+    assert desk.sheet.choice.isHidden()
+    told: list[str] = []
+    desk.session.message.connect(lambda level, text: told.append(text))
+    desk.work.choose_count(2)
+    desk.work.choose_folder(tmp_path / "images")
+    desk.work.start()
+    qtbot.waitUntil(lambda: desk.work.shows_written)
+    assert "4 images in" in told[-1] and "12-bit numbers, 0 to 4095" in told[-1]
+    assert not desk.sheet.choice.isHidden() and desk.sheet.choice.currentIndex() == 1
+    assert desk.sheet.told.text().startswith("The first 3 images of the folder images, as written")
+    picture = desk.work.written[0]
+    first = cv2.imread(str(tmp_path / "images/images/00000/00000000.png"), cv2.IMREAD_UNCHANGED)
+    assert picture.values.shape == first.shape and picture.values.max() == 1.0
+    assert np.argmax(picture.values) == np.argmax(first)
+    (curve,) = picture.curves
+    brightest = first.argmax(axis=1)[curve.index.astype(int)]
+    assert np.median(np.abs(brightest - curve.position)) < 1.5
+    desk.sheet.choice.setCurrentIndex(0)
+    desk.sheet.choice.activated.emit(0)
+    assert desk.sheet.told.text().startswith("Preview: ") and desk.work.on_sheet is desk.work.pictures
+    desk.sheet.choice.activated.emit(1)
+    assert desk.work.shows_written
+    desk.panel.seed.setValue(7)  # the scenes of the recipe as it is now
+    assert not desk.work.shows_written and not desk.sheet.choice.isHidden()
+
+
+def test_a_damaged_image_of_the_folder_is_left_out(desk: Desk, qtbot: QtBot, tmp_path: Path) -> None:
+    folder = tmp_path / "images"
+    make_dataset(desk.work.recipe, desk.work.root, Wanted(1), folder, engine=Engine(workers=1))
+    (folder / "images/00000/00000000.png").write_bytes(b"no image")
+    desk.work.choose_folder(folder)
+    qtbot.waitUntil(lambda: bool(desk.work.written))
+    assert [one.number for one in desk.work.written] == [1]
 
 
 def test_a_folder_of_another_recipe_is_told(desk: Desk, qtbot: QtBot, tmp_path: Path) -> None:

@@ -88,15 +88,14 @@ def test_a_render_that_was_there_before_the_window_is_shown_without_a_photograph
 
 def test_a_rectangle_limits_what_is_looked_at(qtbot, made):
     qtbot.waitUntil(lambda: made.runner.job(PICTURE) is None)
-    made.limited.setChecked(True)
+    made.rectangle.limited.setChecked(True)
     width, _ = made.view.item.size
-    made.region.setPos((-0.5, 49.5))
-    made.region.setSize((width, 100.0))
+    made.rectangle.put((0, 50, width, 100))
     measured(qtbot, made)
     _, v = points(made)
     assert v.min() >= 50 and v.max() < 150 and len(v) > 95
     assert f"{len(v)} of 100 rows" in made.told.text()
-    made.limited.setChecked(False)
+    made.rectangle.limited.setChecked(False)
     measured(qtbot, made)
     assert len(points(made)[0]) > 0.98 * HEIGHT
 
@@ -138,13 +137,13 @@ def test_figures_of_other_settings_are_said_to_be_old(qtbot, made, tmp_path):
     assert made.old.isVisible()
     made.colour.setCurrentText("auto")
     assert not made.old.isVisible()
-    made.limited.setChecked(True)
+    made.rectangle.limited.setChecked(True)
     assert made.old.isVisible()
     measured(qtbot, made)
     assert not made.old.isVisible()
-    made.region.setSize((60.0, 60.0))
+    made.rectangle.boxes[2].setValue(60)
     assert made.old.isVisible()
-    made.limited.setChecked(False)
+    made.rectangle.limited.setChecked(False)
     measured(qtbot, made)
     write(tmp_path / "3.png", photograph(SCENE, seed=3))
     made.add([tmp_path / "3.png"])
@@ -154,7 +153,7 @@ def test_figures_of_other_settings_are_said_to_be_old(qtbot, made, tmp_path):
 
 
 def test_no_control_moves_when_there_are_figures(qtbot, made):
-    controls = (made.colour, made.axis, made.limited, made.measure_button)
+    controls = (made.colour, made.axis, made.rectangle.limited, made.measure_button)
     before = [control.mapTo(made, QPoint(0, 0)) for control in controls]
     measured(qtbot, made)
     QApplication.processEvents()

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
+import cv2
 import numpy as np
 import pytest
 from PySide6.QtWidgets import QMainWindow
@@ -20,7 +21,7 @@ from studio.qt.core.actions import Actions
 from studio.qt.core.jobs import RENDER, JobRunner
 from studio.qt.core.session import Session
 from studio.qt.render.develop_panel import DevelopPanel
-from studio.qt.results.export_actions import ExportActions
+from studio.qt.results.export_actions import KINDS, ExportActions
 from studio.runtime.preferences import PreferencesFile
 from studio.scan.height_map import export_height_map
 from studio.scan.scan_results import ScanResults
@@ -90,6 +91,24 @@ def test_the_height_map_of_a_scan_is_of_all_its_points(
     )
     assert export(session, tmp_path / "map.png", qtbot, "export_heightmap").startswith(b"\x89PNG")
     assert json.loads((tmp_path / "map.json").read_text())["points"] == 20
+
+
+@pytest.mark.parametrize("key", ["export_png", "export_exr"])
+def test_images_that_viewers_show_black_are_said_to_be_so_and_hold_the_sensors_numbers(
+    measured: tuple[Session, DevelopPanel], qtbot: QtBot, tmp_path: Path, key: str
+) -> None:
+    session, panel = measured
+    told: list[tuple[str, str]] = []
+    session.message.connect(lambda level, text: told.append((level, text)))
+    export(session, tmp_path / ("a" + KINDS[key][1]), qtbot, key)
+    assert session.shown is not None
+    written = cv2.imread(str(tmp_path / "a.png"), cv2.IMREAD_UNCHANGED)
+    assert np.array_equal(written, session.shown.images[0].pixels) and written.dtype == np.uint16
+    assert told[-1][1].splitlines()[-1].startswith("12-bit numbers, 0 to 4095, in PNGs of 16 bits")
+    session.set(("sensor", "bits"), 8)  # of the sensor as it is now
+    qtbot.waitUntil(lambda: not panel.busy)
+    export(session, tmp_path / ("b" + KINDS[key][1]), qtbot, key)
+    assert "PNGs" not in told[-1][1]
 
 
 def exporting(

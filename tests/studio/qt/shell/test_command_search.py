@@ -10,7 +10,7 @@ from pytestqt.qtbot import QtBot
 from analysis.gauges.gauge import TITLES
 from studio.qt.core.render import Render
 from studio.qt.forms.form import Section
-from studio.qt.shell.command_search import CommandSearch
+from studio.qt.shell.command_search import WORDS, CommandSearch
 from studio.qt.shell.window import MainWindow
 from tests.studio.qt.small_session import small_project, small_render
 
@@ -85,6 +85,52 @@ def test_what_is_called_otherwise_or_is_in_a_panel_is_found(
     qtbot.addWidget(search)
     search.show_found(typed)
     assert text in [search.list.item(i).text() for i in range(search.list.count())]
+
+
+@pytest.mark.parametrize("typed", ["choose", "accuracy", "speed", "lens"])
+def test_where_a_scanner_is_designed_is_found_by_what_is_chosen_there(
+    window: MainWindow, qtbot: QtBot, typed: str
+) -> None:
+    """Only fields were found, of those that have the word in their name."""
+    search = CommandSearch(window)
+    qtbot.addWidget(search)
+    search.show_found(typed)
+    shown = [search.list.item(i).text() for i in range(search.list.count())]
+    for text in ("View > Set up   F6", "View > Panels > Design"):
+        assert text in shown[:12]
+
+
+@pytest.mark.parametrize(
+    ("typed", "text"),
+    [("training", "View > Dataset"), ("checkerboard", "View > Calibrate"), ("settings", "Edit > Preferences")],
+)
+def test_workspaces_and_commands_are_found_by_words_of_others(
+    window: MainWindow, qtbot: QtBot, typed: str, text: str
+) -> None:
+    search = CommandSearch(window)
+    qtbot.addWidget(search)
+    search.show_found(typed)
+    assert search.list.item(0).text().startswith(text)
+
+
+def test_a_panel_that_is_there_is_not_closed_by_looking_for_it(window: MainWindow, qtbot: QtBot) -> None:
+    window.switch_to("setup")
+    assert not window.docks["readout"].isHidden() and window.docks["log"].isHidden()
+    for typed, key in (("baseline", "readout"), ("messages", "log")):
+        search = CommandSearch(window)
+        qtbot.addWidget(search)
+        search.show_found(typed)
+        texts = [search.list.item(i).text() for i in range(search.list.count())]
+        search.list.setCurrentRow(next(i for i, text in enumerate(texts) if text.startswith("View > ")))
+        search.choose()
+        QApplication.processEvents()
+        qtbot.waitUntil(lambda key=key: not window.docks[key].isHidden())
+
+
+def test_every_word_for_a_command_is_of_one_that_there_is(window: MainWindow, qtbot: QtBot) -> None:
+    search = CommandSearch(window)
+    qtbot.addWidget(search)
+    assert sum(bool(entry.words) for entry in search.entries) == len(WORDS)
 
 
 def test_a_measure_is_added_from_the_search_once_there_is_a_profile(window: MainWindow, qtbot: QtBot) -> None:

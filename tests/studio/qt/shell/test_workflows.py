@@ -16,7 +16,10 @@ from pytestqt.qtbot import QtBot
 from studio.preview.gizmo_geometry import arm_end
 from studio.project.project import Project
 from studio.qt.core.render import Render
+from studio.qt.shell.file_actions import template
 from studio.qt.shell.window import MainWindow
+from studio.study.draft import spec_of
+from studio.study.study import Study
 
 RIG, LASER, OBJECT = ("scene", "rig"), ("scene", "rig", "lasers", 0), ("scene", "objects", 0)
 CTRL, SHIFT, ALT, PLAIN = (
@@ -237,3 +240,21 @@ def test_hover_in_the_image_marks_the_plots(window: MainWindow, qtbot: QtBot) ->
     qtbot.waitUntil(lambda: window.session.hovered is not None)
     assert window.session.hovered is not None and abs(window.session.hovered - 100) <= 2
     assert window.panels["results"].rows.cursors[0].value() == window.session.hovered  # type: ignore[attr-defined]
+
+
+def test_a_panel_that_needs_a_file_of_the_project_has_it_saved(
+    window: MainWindow, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A study, whose file names it, of a template that was changed and never saved."""
+    window.files.replace(template("plane", window.files.autosave))
+    assert window.session.set(("sensor", "read_noise"), 3.0)
+    study = window.panels["study"]
+    work = study.work  # type: ignore[attr-defined]
+    work.vary(("sensor", "read_noise"), spec_of(window.session.project, "sensor.read_noise"))
+    monkeypatch.setattr("studio.qt.study.study_panel.ask_to_save_first", lambda *_: True)
+    paths = iter((tmp_path / "mine.json", tmp_path / "noise.json"))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(next(paths)), ""))
+    study._save()  # type: ignore[attr-defined]
+    assert not window.session.document.dirty and window.session.document.path == tmp_path / "mine.json"
+    made, root = Study.load(tmp_path / "noise.json")
+    assert made.base == "mine.json" and made.bases(root)["mine.json"].sensor.read_noise == 3.0

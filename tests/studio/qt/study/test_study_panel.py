@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QMenu
 from pytestqt.qtbot import QtBot
 
 from studio.editing.scene_edits import LASERS
@@ -17,6 +19,12 @@ from studio.study.draft import VALUES
 from studio.study.store import FILE
 from studio.study.study import Study, ready_made
 from tests.studio.qt.study.desk import NOISE, POWER, Desk, run
+
+
+def filled(menu: QMenu) -> list[QAction]:
+    """As it is when it opens."""
+    menu.aboutToShow.emit()
+    return menu.actions()
 
 
 class TestDraft:
@@ -183,6 +191,42 @@ class TestDraft:
         desk.work.start_anew()
         desk.work.load(tmp_path / "noise.json")
         assert desk.work.study() == before
+
+    @pytest.mark.parametrize("saves", [True, False])
+    def test_the_project_is_to_be_saved_before_anybody_is_asked_where_the_study_goes(
+        self, desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, saves: bool
+    ) -> None:
+        """It was refused after the dialog of files had been answered."""
+        asked: list[str] = []
+
+        def where(*_: object) -> tuple[str, str]:
+            asked.append("where")
+            return str(tmp_path / "noise.json"), ""
+
+        def first(parent: object, name: str, why: str) -> bool:
+            asked.append("first")
+            return saves
+
+        monkeypatch.setattr("studio.qt.study.study_panel.QFileDialog.getSaveFileName", where)
+        monkeypatch.setattr("studio.qt.study.study_panel.ask_to_save_first", first)
+        document = desk.session.document
+        desk.session.save_asked.connect(lambda: document.save(tmp_path / "plane.json"))
+        desk.small([2.0, 20.0])
+        assert desk.session.set(NOISE, 3.0)
+        save = next(action for action in filled(desk.panel.files.menu()) if action.text() == "Save the study…")
+        save.trigger()
+        assert asked == (["first", "where"] if saves else ["first"])
+        assert (tmp_path / "noise.json").exists() is saves and not desk.work.failure
+
+    def test_nobody_is_asked_where_a_study_goes_that_cannot_be_saved(
+        self, desk: Desk, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        told: list[tuple[str, str]] = []
+        desk.session.message.connect(lambda level, text: told.append((level, text)))
+        monkeypatch.setattr("studio.qt.study.study_panel.QFileDialog.getSaveFileName", lambda *_: pytest.fail("asked"))
+        save = next(action for action in filled(desk.panel.files.menu()) if action.text() == "Save the study…")
+        save.trigger()  # nothing is varied yet
+        assert told == [("warning", "The study cannot be saved: Sweep 1: 0 fields are varied; allowed: 1 to 8")]
 
     def test_the_panel_has_room_for_every_kind_of_row(self, qtbot: QtBot, desk: Desk) -> None:
         """At its narrowest nothing is cut off, nor hidden behind the edge of the scrolled part."""
