@@ -16,7 +16,8 @@ from analysis.report.sums import Moments, Sums
 from render.base.arrays import Float
 
 NARROW_PX = 0.4
-"""Sigma of a line, px, below which the pixels undersample it."""
+"""Sigma of a line, px, below which the pixels undersample it: by method, from 0.28 to 0.35 px down its place is 0.03 px
+off by where between two pixels it lies. The one limit that is told before a render, of a study and in a report."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ UP_AXES: tuple[UpAxis, ...] = get_args(UpAxis)
 FILLED = 0.8
 """Of the camera's view, by a part that was fitted to it."""
 STANDS = 1e-6
-"""m from height zero, within which a part's lowest vertex stands on the ground."""
+"""m, within which a part's lowest vertex stands on the ground, or touches another part."""
 
 
 def up_axis(item: SceneObject) -> UpAxis | None:
@@ -139,12 +139,22 @@ def meeting(boxes: Sequence[tuple[Float, Float]], index: int) -> list[int]:
     """
     around = [_around(box, to_world) for box, to_world in boxes]
     low, high = around[index]
-    slack = 1e-6
     return [
         k
         for k, (other_low, other_high) in enumerate(around)
-        if k != index and np.all((low < other_high - slack) & (other_low < high - slack))
+        if k != index and np.all((low < other_high - STANDS) & (other_low < high - STANDS))
     ]
+
+
+def reaches_into(own: Float, other: Float) -> bool:
+    """Whether the box around vertices (n, 3) reaches into what triangles (t, 3, 3) m have above or below it.
+
+    What is put on top of another is not: of a sloping or stepped one the box around all is higher than its place there.
+    """
+    low, high = own.min(axis=0), own.max(axis=0)
+    top = highest_within(other, low[:2], high[:2])
+    foot = -highest_within(other * np.array([1.0, 1.0, -1.0]), low[:2], high[:2])
+    return bool(low[2] < top - STANDS and foot < high[2] - STANDS)
 
 
 def _around(box: Float, to_world: Float) -> tuple[Float, Float]:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.report.total import NARROW_PX as UNDERSAMPLED_PX
+from analysis.report.total import NARROW_PX
 from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float, Float32
 from render.camera.camera import Camera
@@ -40,8 +40,8 @@ PROBE_ERROR = 0.05
 PROBE_REFLECTED = 0.3
 """The same of reflected light."""
 WORKING_DISTANCES = np.geomspace(0.01, 100.0, 4001)
-NARROW_PX, WIDE_PX = 1.25 * UNDERSAMPLED_PX, 6.0
-"""Sigma of a line that measures well: with room above what pixels undersample, as a median varies along the line."""
+WIDE_PX = 6.0
+"""Sigma of a line up to which it measures well; from NARROW_PX on."""
 SHOWN_PX = 0.45
 """Sigma below which a line's second moment in an image depends on where between the pixels it lies."""
 BROADEST_PX = 100.0

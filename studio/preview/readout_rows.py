@@ -7,10 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from analysis.report.total import NARROW_PX
 from analysis.report.units import grouped
 from studio.editing.units import Unit
 from studio.preview.estimates import BLURRED_PX, SHARP_PX
-from studio.preview.inspection import DIM_ELECTRONS, NARROW_PX, WIDE_PX
+from studio.preview.inspection import DIM_ELECTRONS, WIDE_PX
 from studio.preview.readouts import Range, Readouts
 
 Level = Literal["", "warning", "error"]

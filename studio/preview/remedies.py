@@ -6,8 +6,9 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from analysis.report.total import NARROW_PX
 from render.base.errors import InputError
-from studio.preview.inspection import DIM_ELECTRONS, NARROW_PX, WIDE_PX
+from studio.preview.inspection import DIM_ELECTRONS, WIDE_PX
 from studio.preview.preview import Look
 from studio.preview.readout_rows import ANGLE, MEASURED, NOTHING, SATURATED, Row, micrometres, rows
 from studio.preview.readouts import Range, Readouts, readouts

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from analysis.report.total import NARROW_PX
 from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float
 from render.base.errors import InputError
@@ -20,7 +21,7 @@ from studio.editing.placing import aimed, at_angle
 from studio.editing.units import Unit
 from studio.preview.estimates import SHARP_PX, dioptre_px
 from studio.preview.focusing import between
-from studio.preview.inspection import NARROW_PX, WIDE_PX
+from studio.preview.inspection import WIDE_PX
 from studio.preview.preview import Look, Mask
 from studio.preview.readout_rows import SATURATED
 from studio.preview.readouts import RARE, Range, Readouts
@@ -36,6 +37,8 @@ LEAST_OCCLUDED = 12.0
 """Degrees, somewhat above those at which depth is coarse."""
 UNFOCUSED = 0.25
 """Of the blur, what is left at best focus, below which the lens is focused before it is stopped down."""
+THIN_PX = 1.0
+"""Sigma that a line gets which is too narrow for the pixels."""
 TURNS = 6
 """Times a laser is turned until the angle is read that is wanted."""
 TURNED = math.radians(0.05)
@@ -221,7 +224,7 @@ def _waist(look: Look, laser: int, now: Readouts) -> Change | None:
 
 def _wanted(width: Range) -> float:
     """px, for a line that is too narrow or too wide."""
-    return 2.0 * NARROW_PX if width.middle < NARROW_PX else 0.5 * WIDE_PX
+    return THIN_PX if width.middle < NARROW_PX else 0.5 * WIDE_PX
 
 
 def _laser_focus(look: Look, laser: int) -> Step | None:

@@ -1,4 +1,5 @@
-"""What the 3D view draws of a rig, as plain points and lines: frustum, fan, lit curve, working volume, lamps, grid."""
+"""What the 3D view draws of a rig, as plain points and lines: frustum, fan, lit curve, working volume, lamps, a
+turntable's axis, grid."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from render.camera.camera import Camera
 from render.frame import LaserCurve
 from render.laser.laser import LineLaser
 from render.scene.lights import Light, RectangleLight
+from render.scene.motion import Turntable
 from render.scene.scene import Scene
 from studio.editing.placement import rounded, working_distance
 from studio.preview.preview import Fan
@@ -25,6 +27,8 @@ MOST_JOINS = 3
 """Crossings of one scan line that a join may step over."""
 FAR_CORNERS = 4.0
 """Working distances to which the frustum's edges are drawn where nothing is in focus."""
+ARC_POINTS = 37
+"""Of three quarters of a circle."""
 
 
 def image_corners(camera: Camera, depth: float) -> Float:
@@ -143,6 +147,31 @@ def lamp(light: Light, size: float) -> tuple[Float, list[tuple[int, int]]]:
     rays = [(p - 1) / np.linalg.norm(p - 1) for p in grid]
     points = np.array([end * ray * size for ray in rays for end in (0.4, 1.2)])
     return points, [(2 * i, 2 * i + 1) for i in range(len(rays))]
+
+
+def turning(motion: Turntable, low: Float, high: Float, size: float) -> tuple[Float, list[tuple[int, int]]]:
+    """Points, world frame, and lines: a turntable's axis through a box (3,), (3,) and beyond it, about it an arrow.
+
+    The arrow goes the way that things turn; there is none where a step turns by nothing.
+    """
+    axis, centre = np.asarray(motion.axis) / np.linalg.norm(motion.axis), np.asarray(motion.centre)
+    along = (np.array(np.meshgrid(*np.stack([low, high]).T)).reshape(3, -1).T - centre) @ axis
+    foot, top = float(along.min()) - 2.0 * size, float(along.max()) + 9.0 * size
+    points = [centre + foot * axis, centre + top * axis]
+    lines = [(0, 1)]
+    if motion.angle_step != 0.0:
+        across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+        across /= np.linalg.norm(across)
+        ahead = math.copysign(1.0, motion.angle_step) * np.cross(axis, across)
+        middle, radius = points[1] - 3.0 * size * axis, 3.0 * size
+        turns = np.linspace(0.0, 1.5 * np.pi, ARC_POINTS)
+        first = len(points)
+        points += [middle + radius * (math.cos(turn) * across + math.sin(turn) * ahead) for turn in turns]
+        lines += [(i, i + 1) for i in range(first, first + ARC_POINTS - 1)]
+        # the arc ends opposite to where it would go on, so that its way there is along `across`
+        points += [points[-1] - 0.6 * radius * across + side * 0.35 * radius * ahead for side in (-1.0, 1.0)]
+        lines += [(first + ARC_POINTS - 1, len(points) - k) for k in (1, 2)]
+    return np.array(points), lines
 
 
 def grid(low: Float, high: Float) -> tuple[float, Float]:

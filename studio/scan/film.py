@@ -14,8 +14,10 @@ from analysis.report.colour import DIVERGING
 from render.base.arrays import Float
 from render.base.errors import Cancelled, InputError
 from render.base.files import atomic_write, read_bytes
+from render.base.progress import StageProgress
 from render.base.threads import Cancel
 from render.run import never
+from studio.runtime.console import frame_of, silent
 from studio.scan.height_map import points_of
 from studio.scan.own_files import FILM_TITLE, check_replaceable
 from studio.scan.scan_folder import ScanFolder, check_kept, open_folder
@@ -87,11 +89,24 @@ def write_film(
     return len(images)
 
 
-def export_film(scan: ScanResults | None, path: Path, _: object = None) -> list[Path]:
-    """Of the whole scan that a frame is a step of. InputError: it is of none, or as `write_film`."""
+def export_film(
+    scan: ScanResults | None,
+    path: Path,
+    _: object = None,
+    *,
+    progress: StageProgress = silent,
+    cancelled: Cancel = never,
+) -> list[Path]:
+    """Of the whole scan that a frame is a step of. InputError: it is of none, or as `write_film`. Cancelled."""
     if scan is None:
         raise InputError("a single frame is no film", cure="run the scan, or open the results of one")
-    write_film(scan.found.folder, path, RATE)
+    count = scan.count
+
+    def drawn(done: float) -> None:
+        progress(frame_of(done, count), done)
+
+    drawn(0.0)
+    write_film(scan.found.folder, path, RATE, drawn, cancelled)
     return [path]
 
 

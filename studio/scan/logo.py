@@ -16,6 +16,8 @@ MOST_BYTES = 16 * 2**20
 WIDEST, TALLEST = 640, 240
 """px in the page."""
 MOST_PIXELS = 50_000_000
+ALLOWED = "allowed: a PNG or JPEG in that folder, by its path from there, such as logo.png"
+CURE = "copy it there, or choose it by the button … of the field, which does"
 
 
 def logo_remarks(project: Project, root: Path) -> list[str]:
@@ -37,11 +39,14 @@ def logo_uri(name: str, root: Path) -> tuple[str, str]:
     """data: URI of a PNG, and why there is none; both empty: no logo is named. What is transparent becomes white."""
     if not name:
         return "", ""
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     try:
-        data = read_bytes(inside(root, name, "delivery.logo"), MOST_BYTES, "logo")
-        opened = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
+        file = inside(root, name, "delivery.logo")
+    except InputError:
+        return "", f"The logo {name} is not shown: it lies outside of the project's folder; {ALLOWED}; {CURE}."
+    try:
+        opened = Image.open(io.BytesIO(read_bytes(file, MOST_BYTES, "logo")), formats=("PNG", "JPEG"))
         if opened.width * opened.height > MOST_PIXELS:
             raise ValueError(f"it has {opened.width} x {opened.height} px")
         whole = opened.convert("RGBA")
@@ -49,5 +54,7 @@ def logo_uri(name: str, root: Path) -> tuple[str, str]:
         ground = Image.new("RGBA", whole.size, "white")
         ground.alpha_composite(whole)
         return image_uri(np.asarray(ground.convert("RGB"))), ""
+    except UnidentifiedImageError:
+        return "", f"The logo {name} is not shown: it is neither a PNG nor a JPEG."
     except (InputError, OSError, ValueError, SyntaxError) as error:
         return "", f"The logo {name} is not shown: {error}."

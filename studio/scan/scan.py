@@ -10,7 +10,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from render.base.errors import InputError
+from render.base.errors import Cancelled, InputError
 from render.frame import Frame
 from render.output.light_record import plan_record, quality_from, quality_record
 from render.scan_plan import ScanPlan, plan_scan
@@ -195,7 +195,23 @@ def _check_options(options: ScanOptions) -> None:
 
 
 def _take_frames(scan: Scan, first: World, count: int, written: Written, measuring: Measuring | None) -> None:
-    """Render, write and measure one frame after the other; `first`: the world of step 0."""
+    """Render, write and measure one frame after the other; `first`: the world of step 0.
+
+    Cancelled: it says so where nothing is kept.
+    """
+    try:
+        _take_each(scan, first, count, written, measuring)
+    except (Cancelled, KeyboardInterrupt):
+        if scan.options.frames != "none" or measuring is None:
+            raise
+        done = f"{len(measuring.record.steps)} of {count} were measured"
+        raise Cancelled(
+            f"nothing is kept: by --frames none the points of all frames are written at the end ({done}), and "
+            "--resume has nothing to go on from; with --frames band it has"
+        ) from None
+
+
+def _take_each(scan: Scan, first: World, count: int, written: Written, measuring: Measuring | None) -> None:
     with FrameWriter(scan) as writer, closing(rendered_frames(scan, first, count)) as frames:
         for _ in scan.clock.frames(count):
             found = next(frames)

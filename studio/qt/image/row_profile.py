@@ -107,6 +107,9 @@ class RowProfile(QWidget):
         for signal in (session.developed, session.measured, session.renders_changed):
             signal.connect(self.refresh)
         session.project_changed.connect(self._follow_project)
+        session.document_replaced.connect(self._start_anew)
+        self._anew = True
+        """Nothing was zoomed to in this project."""
         self._as_it_was = False
         """The scene has changed since what is shown."""
         self._colour()
@@ -115,6 +118,9 @@ class RowProfile(QWidget):
     def _follow_project(self) -> None:
         if self.session.stale != self._as_it_was:
             self.refresh()
+
+    def _start_anew(self) -> None:
+        self._anew = True
 
     def show_laser(self, laser: int) -> None:
         """Whose image it is."""
@@ -170,7 +176,8 @@ class RowProfile(QWidget):
         self._as_it_was = self.session.stale
         before = ["<i>in the scene as it was rendered:</i>"] if self._as_it_was else []
         self.text.setText("   ".join([*before, *told]) if told else "no line here")
-        if self.follow.isChecked():
+        if self.follow.isChecked() or self._anew:
+            self._anew = False
             self._look_at(places, lines, index, values, image)
 
     def _index(self, curve: LaserCurve | None, count: int) -> int:

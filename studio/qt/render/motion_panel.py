@@ -32,11 +32,12 @@ from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.folders import ask_results_folder, may_replace_scan, unused_name
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner
 from studio.qt.core.open_file import open_file
+from studio.qt.core.scan_progress import scan_progress, share
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.core.step_bar import StepBar
 from studio.qt.render.resuming import ask_resume, told_before_resuming
-from studio.runtime.console import FRAMES, frame_of
+from studio.runtime.console import FRAMES
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job, Progress
 from studio.scan.options import Listener, ScanOptions
@@ -196,22 +197,12 @@ class MotionPanel(QWidget):
         def work(progress: Progress, cancelled: Cancel) -> ScanResult:
             from studio.scan.scan import run_scan  # takes a while: not before a scan
 
-            at, where = 0.0, ""
-
-            def tell(stage: str, done: float) -> None:
-                nonlocal at, where
-                at = max(at, share(stage, done) or 0.0)
-                if stage == FRAMES:
-                    where = f"{frame_of(done, count)}: " if done < 1.0 else ""
-                else:
-                    progress(where + stage, at)
-
             return run_scan(
                 order.project,
                 order.root,
                 out=order.folder,
                 options=ScanOptions(image_scale=order.image_scale, report=order.report, resume=resume),
-                listener=Listener(tell, cancelled, measured=each),
+                listener=Listener(scan_progress(progress, count), cancelled, measured=each),
                 source=source,
             )
 
@@ -339,13 +330,6 @@ def size_of(order: Order) -> str:
 def frames_there(folder: Path, count: int) -> int:
     """Of the first frames of a scan, those that an earlier run has left in its folder."""
     return next((i for i in range(count) if not (folder / f"{frame_stem(i)}.json").is_file()), count)
-
-
-def share(stage: str, done: float) -> float | None:
-    """How much of a scan is done; None: the stage does not say."""
-    if stage == FRAMES:
-        return 0.02 + 0.93 * done
-    return 0.96 + 0.03 * done if stage in ("writing points", "report") else None
 
 
 def describe(motion: object, step: int) -> str:

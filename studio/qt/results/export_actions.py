@@ -19,6 +19,7 @@ from studio.qt.core.actions import Actions
 from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.jobs import RENDER, JobRunner
 from studio.qt.core.render import Render
+from studio.qt.core.scan_progress import scan_progress
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.runtime.error_messages import trouble
@@ -134,14 +135,15 @@ class ExportActions(QObject):
             "image": export.export_image,
             "points": export.export_points,
             "height map": partial(export_height_map, render.scan),
-            "film": partial(export_film, render.scan),
         }
 
         def work(progress: Progress, cancelled: Cancel) -> list[Path]:
             progress("", 0.0)  # how far it is, nobody knows, and the job's name has the file's
+            writers["film"] = partial(export_film, render.scan, progress=progress, cancelled=cancelled)
             writer = writers[kind]
             if whole is not None:
-                writer = _of_all_steps(kind, whole, how.powered, shown.root, Clock(progress, cancelled))
+                clock = Clock(scan_progress(progress, whole.count), cancelled)
+                writer = _of_all_steps(kind, whole, how.powered, shown.root, clock)
             as_shown = whole is not None or current or kind in ("frame", "height map", "film")
             what = shown if as_shown else _measured(shown, how, noise, cancelled)
             if kind == "height map":  # nobody was asked about the file beside the picture

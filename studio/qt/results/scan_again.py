@@ -9,6 +9,7 @@ from render.base.threads import Cancel
 from studio.qt.core.actions import Actions
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.render import Render
+from studio.qt.core.scan_progress import scan_progress
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.runtime.jobs import Progress
@@ -46,7 +47,7 @@ class ScanAgain(QObject):
         def work(progress: Progress, cancelled: Cancel) -> None:
             from studio.scan.whole_scan import measure_scan_again  # takes a while: not before a scan
 
-            measure_scan_again(scan, how.powered, root, Clock(progress, cancelled))
+            measure_scan_again(scan, how.powered, root, Clock(scan_progress(progress, scan.count), cancelled))
 
         def then(_: None) -> None:
             scan_steps(session).measured[folder] = how.powered

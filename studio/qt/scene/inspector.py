@@ -33,6 +33,7 @@ LIST_HINTS = {
     "objects": "What the scanner looks at. Drop mesh files on the scene to add more.",
     "lights": "Ambient light besides the environment.",
 }
+LOGO_FILES = "Images (*.png *.jpg *.jpeg);;All files (*)"
 IMAGE_FILES = "Images (*.png *.jpg *.jpeg *.tif *.tiff *.bmp);;All files (*)"
 
 
@@ -155,7 +156,7 @@ class Inspector(QWidget):
             if file is not None:
                 mesh_importer.import_meshes(self.session, [file], self, partial(take_mesh, self.session, path[:3]))
             return
-        file = choose_file(self.session, self, "Image", IMAGE_FILES)
+        file = choose_file(self.session, self, "Image", LOGO_FILES if path == ("delivery",) else IMAGE_FILES)
         if file is None or not mesh_importer.may_copy(self, [file], root):
             return
         try:

@@ -21,6 +21,7 @@ from studio.editing import mesh_placing
 from studio.editing.scene_edits import OBJECTS, replace_mesh_of
 from studio.editing.units import Unit
 from studio.preview.inside import CURE, inside
+from studio.preview.preview import Placed
 from studio.project.document import FieldPath, replaced, value_at
 from studio.project.mesh_import import ImportedMesh
 from studio.project.project import Project
@@ -151,10 +152,7 @@ class MeshBar(QWidget):
             return
         look = live(self.session).look
         others = [one for one in look.placed if _size(look.scene.visible_objects[one.index]) != _size(item)]
-        triangles = [
-            transform_points(one.T_world_object, one.body.surface.vertices)[one.body.surface.triangles]
-            for one in others
-        ]
+        triangles = [_triangles(one) for one in others]
         if self._place("put on top", lambda item, vertices: mesh_placing.on_top(item, vertices, triangles)):
             self._tell_move(item, "its lowest point to the top of what is below it, or to the ground", "on top")
 
@@ -196,7 +194,10 @@ class MeshBar(QWidget):
         visible = [look.scene.visible_objects[one.index] for one in look.placed]
         index = next(i for i, one in enumerate(visible) if _size(one) == _size(item))
         boxes = [(one.body.bounds, one.T_world_object) for one in look.placed]
-        names = [visible[k].name for k in mesh_placing.meeting(boxes, index)]
+        own = transform_points(look.placed[index].T_world_object, look.placed[index].body.surface.vertices)
+        near = mesh_placing.meeting(boxes, index)
+        met = [k for k in near if mesh_placing.reaches_into(own, _triangles(look.placed[k]))]
+        names = [visible[k].name for k in met]
         return ", ".join(names[:2]) + (f" and {len(names) - 2} more" if len(names) > 2 else "")
 
     def _around(self, item: SceneObject) -> str:
@@ -229,6 +230,12 @@ class MeshBar(QWidget):
         found = (one for one in look.placed if _size(look.scene.visible_objects[one.index]) == _size(item))
         placed = next(found, None)
         return None if placed is None else placed.body.surface.vertices
+
+
+def _triangles(placed: Placed) -> Float:
+    """(t, 3, 3) m corners in the world."""
+    surface = placed.body.surface
+    return transform_points(placed.T_world_object, surface.vertices)[surface.triangles]
 
 
 def _size(item: SceneObject) -> tuple[object, ...]:

@@ -12,51 +12,58 @@ from studio.qt.render.motion_panel import MotionPanel
 from studio.qt.scene.scene_tree import SceneTree
 from studio.qt.shell.panels import Panels
 
-BESIDE = "readout"
-"""The panel that it comes behind."""
+HOME, BESIDE = "setup", "readout"
+"""The workspace that has it where the project moves, and the panel there that it comes behind."""
 
 
-def join_motion(
-    panels: Panels,
-    commands: Actions,
-    docks: dict[str, QDockWidget],
-    call_panel: Callable[[str], None],
-    workspace: Callable[[], str],
-) -> Callable[[], None]:
-    """call_panel: brings a panel to the front by its key. workspace: the key of the one that is shown.
+class MotionCalls:
+    """`offer` gives the panel its place where the project moves, `leave` notes whether it is in front there."""
 
-    What is returned offers the panel there: as a tab, and what was in front stays there.
-    """
-    motion, tree = panels["motion"], panels["scene"]
-    assert isinstance(motion, MotionPanel) and isinstance(tree, SceneTree)
+    def __init__(
+        self,
+        panels: Panels,
+        commands: Actions,
+        docks: dict[str, QDockWidget],
+        call_panel: Callable[[str], None],
+        workspace: Callable[[], str],
+    ) -> None:
+        """call_panel: brings a panel to the front by its key. workspace: the key of the one that is shown."""
+        motion, tree = panels["motion"], panels["scene"]
+        assert isinstance(motion, MotionPanel) and isinstance(tree, SceneTree)
+        self._motion, self._commands, self._docks = motion, commands, docks
+        self._call_panel, self._workspace = call_panel, workspace
+        self._in_front = False
+        """When its workspace was left."""
+        self._kind = motion.session.project.scene.motion.kind
+        motion.session.project_changed.connect(self._follow)
+        tree.motion_clicked.connect(lambda: call_panel("motion"))
+        commands.connect("scan", lambda: self._call(motion.ask_and_run))
+        commands.connect("resume_scan", lambda: self._call(motion.ask_and_resume))
+        motion.stopped_changed.connect(self._allow)
+        self._allow()
 
-    def call(then: Callable[[], object]) -> Callable[[], None]:
-        def called() -> None:
-            call_panel("motion")
-            then()
+    def offer(self) -> None:
+        """As a tab: in front where it was when its workspace was left, else what is in front stays there."""
+        moves = self._motion.session.project.scene.frame_count > 1
+        if self._workspace() == HOME and moves and self._docks["motion"].isHidden():
+            self._call_panel("motion")
+            if not self._in_front:
+                self._docks[BESIDE].raise_()
 
-        return called
+    def leave(self) -> None:
+        """Another workspace is about to be shown."""
+        if self._workspace() == HOME:
+            self._in_front = not self._motion.visibleRegion().isEmpty()
 
-    def allow() -> None:
-        commands["resume_scan"].setEnabled(motion.stopped is not None)
+    def _call(self, then: Callable[[], object]) -> None:
+        self._call_panel("motion")
+        then()
 
-    def offer() -> None:
-        if workspace() == "setup" and motion.session.project.scene.frame_count > 1 and docks["motion"].isHidden():
-            call_panel("motion")
-            docks[BESIDE].raise_()
+    def _allow(self) -> None:
+        self._commands["resume_scan"].setEnabled(self._motion.stopped is not None)
 
-    still = motion.session.project.scene.motion.kind
-
-    def follow() -> None:
-        nonlocal still
-        before, still = still, motion.session.project.scene.motion.kind
-        if before != still:
-            offer()
-
-    motion.session.project_changed.connect(follow)
-    tree.motion_clicked.connect(call(lambda: None))
-    commands.connect("scan", call(motion.ask_and_run))
-    commands.connect("resume_scan", call(motion.ask_and_resume))
-    motion.stopped_changed.connect(allow)
-    allow()
-    return offer
+    def _follow(self) -> None:
+        before, self._kind = self._kind, self._motion.session.project.scene.motion.kind
+        if before != self._kind:
+            self._in_front = False
+            self.offer()

@@ -38,7 +38,7 @@ from studio.qt.shell.escape import escape
 from studio.qt.shell.file_actions import FileActions
 from studio.qt.shell.going import what_goes
 from studio.qt.shell.help import Help, panel_with_focus
-from studio.qt.shell.motion_calls import join_motion
+from studio.qt.shell.motion_calls import MotionCalls
 from studio.qt.shell.panels import PANELS, Making, Panels
 from studio.qt.shell.preferring import Preferring
 from studio.qt.shell.seen_selection import where_seen
@@ -299,7 +299,7 @@ class MainWindow(QMainWindow):
         }
         for key, handler in handlers.items():
             self.commands.connect(key, handler)
-        self.offer_motion = join_motion(self.panels, self.commands, self.docks, self.call_panel, lambda: self.workspace)
+        self.motion_calls = MotionCalls(self.panels, self.commands, self.docks, self.call_panel, lambda: self.workspace)
         for key, command in SWITCH.items():
             self.commands.connect(command, partial(self.switch_to, key))
         themes = QActionGroup(self)
@@ -323,7 +323,7 @@ class MainWindow(QMainWindow):
         one_of(CellOpener, session).opened.connect(lambda: self.switch_to("measure"))
         session.project_changed.connect(self._tell_document)
         session.document_replaced.connect(self._tell_document)
-        session.document_replaced.connect(self.offer_motion)
+        session.document_replaced.connect(self.motion_calls.offer)
         session.document_replaced.connect(lambda: QTimer.singleShot(TRIM_MS, self, return_what_is_free))
         session.selection_changed.connect(self._tell_selection)
         session.step_changed.connect(lambda: live(session).show_step(session.step))
@@ -372,10 +372,11 @@ class MainWindow(QMainWindow):
             self.resize(self.size().boundedTo(size))  # the last workspace's columns may have made it grow
         if not self._restore_panels():
             share_out(self, self.docks, workspace(self.workspace))
-        self.offer_motion()
+        self.motion_calls.offer()
         hide_stray_tabs(self)
 
     def _send_back(self) -> None:
+        self.motion_calls.leave()
         while self._called:
             self.docks[self._called.pop()].hide()
 

@@ -325,7 +325,10 @@ class StudyPanel(QWidget):
 
 
 def estimate_text(told: Estimate, processors: int) -> str:
-    """ "40 cells of 10 renders to go, about 2:10 on 2 processors, 0.3 MB", and what to know of figures at its scale."""
+    """ "40 cells of 10 renders to go, about 2:10 on 2 processors, 0.3 MB", and what to know of figures at its scale.
+
+    A cell of one study takes a hundred times what one of another does: before one was measured no time is told.
+    """
     notes = [left_over_text(told.left_over), *told.doubts] if told.left_over else told.doubts
     if told.cells + told.searched == 0:
         return " ".join(["Every cell is measured.", *notes])
@@ -337,6 +340,8 @@ def estimate_text(told: Estimate, processors: int) -> str:
     if (seconds := told.wall(processors)) is not None:
         start = f" ({duration(told.start_up)} of it until they start)" if told.start_up >= 1.0 else ""
         parts.append(f"about {duration(seconds)} on {processors} processors{start}")
+    else:
+        parts.append("not timed yet (Time it measures one cell of each sweep)")
     parts.append(f"{told.bytes / 1e6:.1f} MB")
     return "\n".join([", ".join(parts), *notes])
 

@@ -16,6 +16,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkBillboardTextActor3D, vtkPo
 from analysis.report.colour import wavelength_colour
 from render.base.arrays import Float
 from render.base.pose import transform_points
+from render.scene.motion import Turntable
 from studio.editing.units import Unit
 from studio.preview import rig_drawing
 from studio.preview.preview import Body, Look
@@ -31,7 +32,7 @@ OBJECTS: FieldPath = ("scene", "objects")
 LIGHTS: FieldPath = ("scene", "lights")
 MOST_LABELS = 6
 """Numbers along a side of the ground: more lie over each other where the view is small."""
-SMALL_PX, LINE_PX, CURVE_PX = 1.0, 1.6, 3.0
+SMALL_PX, AXIS_PX, LINE_PX, CURVE_PX = 1.0, 1.3, 1.6, 3.0
 
 
 class Lines:
@@ -104,15 +105,16 @@ class ViewportScene:
         self._frustum, self._camera, self._plane = Lines(SMALL_PX), Lines(lit=True), Lines(opacity=0.35)
         self._grid = Lines(SMALL_PX, behind=True)
         self._axis_x, self._axis_y = Lines(LINE_PX, behind=True), Lines(LINE_PX, behind=True)
-        self._outline = Lines(LINE_PX)
+        self._outline, self._turning = Lines(LINE_PX), Lines(AXIS_PX)
+        self._turning.actor.PickableOff()
         self._labels: list[vtkBillboardTextActor3D] = []
         self._grid_box: tuple[float, ...] = ()
         self.spacing = 0.0
         """Of the ground grid, m."""
-        fixed = (self._frustum, self._camera, self._plane, self._grid, self._axis_x, self._axis_y, self._outline)
-        for lines in fixed:
+        rig = (self._frustum, self._camera, self._plane)
+        for lines in (*rig, self._grid, self._axis_x, self._axis_y, self._outline, self._turning):
             renderer.AddActor(lines.actor)
-        for lines in (self._camera, self._plane, self._frustum):
+        for lines in rig:
             self.paths[lines.actor] = CAMERA
 
     def draw(self, look: Look, selections: Sequence[FieldPath], *, settled: bool) -> None:
@@ -123,6 +125,7 @@ class ViewportScene:
         self._draw_camera(look)
         self._draw_lasers(look)
         self._draw_lamps(look)
+        self._draw_turning(look)
         if settled:
             self._draw_grid(*self.bounds(look))
         self.highlight(look, selections)
@@ -193,6 +196,7 @@ class ViewportScene:
         self._colours = colours
         self.renderer.SetBackground(*pv.Color(colours.base).float_rgb)
         self._grid.colour(mixed(colours.muted, colours.base, 0.45))
+        self._turning.colour(colours.text)
         self._axis_x.colour(mixed(colours.error, colours.base, 0.8))
         self._axis_y.colour(mixed(colours.good, colours.base, 0.8))
         for label in self._labels:
@@ -299,6 +303,17 @@ class ViewportScene:
             self.paths.pop(actor, None)
         for light, lamp in zip(lights, self._lamps, strict=True):
             lamp.lines(*_placed(light.T_world_light.matrix, *rig_drawing.lamp(light, 1.5 * self.size)))
+
+    def _draw_turning(self, look: Look) -> None:
+        """The axis that a turntable's motion is about; it takes no part in what is clicked or brought into view."""
+        motion = look.scene.motion
+        if not isinstance(motion, Turntable):
+            self._turning.lines(np.zeros((0, 3)), [])
+            return
+        boxes = [transform_points(item.T_world_object, item.body.bounds) for item in look.placed]
+        around = np.concatenate([*boxes, [motion.centre]])
+        points, pairs = rig_drawing.turning(motion, around.min(axis=0), around.max(axis=0), self.size)
+        self._turning.lines(points, pairs)
 
     def _draw_grid(self, low: Float, high: Float) -> None:
         step, lines = rig_drawing.grid(low, high)

@@ -21,6 +21,7 @@ from studio.editing.mesh_placing import (
     on_ground,
     on_its_foot,
     on_top,
+    reaches_into,
     stands,
     up_axis,
     with_axis_up,
@@ -127,6 +128,19 @@ def test_centred_over_a_place_at_its_own_height(vertices: Float) -> None:
     before, after = (in_world(item, vertices) for item in (ITEM, centred(ITEM, vertices, (0.1, -0.2, 7.0))))
     assert 0.5 * (after.min(axis=0) + after.max(axis=0))[:2] == pytest.approx((0.1, -0.2), abs=NANOMETRE)
     assert after[:, 2] == pytest.approx(before[:, 2], abs=NANOMETRE)
+
+
+def test_what_was_put_on_top_of_a_slope_or_a_step_does_not_reach_into_it(vertices: Float) -> None:
+    """The box around a slope, or around a part that is turned, overlaps that of what merely touches it."""
+    slope = np.array([[[-1.0, -1.0, -0.4], [1.0, -1.0, 0.4], [0.0, 2.0, 0.1]]])
+    step = trimesh.creation.box(extents=(2.0, 2.0, 0.2)).triangles
+    beside = trimesh.creation.box(extents=(0.1, 0.1, 9.0)).apply_translation([1.0, 1.0, 0.0]).triangles
+    for below in (slope, np.concatenate([step, beside])):
+        own = in_world(on_top(ITEM, vertices, [below]), vertices)
+        assert not reaches_into(own, below)
+        assert reaches_into(own - np.array([0.0, 0.0, 1e-4]), below)
+        assert not reaches_into(own - np.array([0.0, 0.0, 20.0]), below), "it is below"
+        assert not reaches_into(own + np.array([30.0, 0.0, -0.1]), below), "it is beside"
 
 
 def test_boxes_that_share_space_are_told_and_what_touches_is_not() -> None:

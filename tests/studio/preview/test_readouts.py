@@ -13,6 +13,7 @@ from analysis.line.detection.noise import NoiseModel
 from analysis.line.extract import extract
 from analysis.line.result import Flag
 from analysis.line.settings import ExtractionSettings
+from analysis.report.total import NARROW_PX
 from render.base.pose import Pose
 from render.camera.camera import Camera
 from studio.editing import units
@@ -20,10 +21,12 @@ from studio.preview.estimates import blur_px, centre_bound_px, depth_of_field, d
 from studio.preview.inspection import inspect
 from studio.preview.preview import Preview
 from studio.preview.readout_rows import NOTHING, Row, rows
-from studio.preview.readouts import Readouts, readouts
+from studio.preview.readouts import Range, Readouts, readouts
 from studio.project.document import replaced
 from studio.project.project import Project
 from studio.project.templates import template_folder
+from studio.study.small_images import small_image_doubts
+from studio.study.study import Study
 from tests.analysis.line.line_images import expected
 
 PROJECTS = Path(__file__).parents[3] / "assets/projects"
@@ -247,6 +250,24 @@ def test_rows_warn_where_a_value_leaves_its_sensible_range() -> None:
     assert row(far, "plane", "blur").level == "error"
     away = replaced(project, (*LASER, "T_rig_laser"), Pose(translation=(0.2, 0, 0), rotation=(0, 0.9, 0)))
     assert row(away, "plane", "working").level == "error"
+
+
+def test_a_design_a_study_and_a_report_tell_one_limit_of_a_thin_line() -> None:
+    """The design wanted 0.5 px, and a study and a report warned from 0.4 px on."""
+    found = read(sample("plane"), "plane")
+
+    def of(width: float) -> Row:
+        seen = replace(found, width_px=Range(width, width, width))
+        return next(row for row in rows(seen) if row.key == "width")
+
+    assert of(1.01 * NARROW_PX).level == "" and of(0.99 * NARROW_PX).level == "warning"
+    assert f"{NARROW_PX:g} to 6 px measure well" in of(1.0).help
+    small = Study.model_validate(
+        {"base": "plane", "image_scale": 0.05, "sweeps": [{"name": "s", "vary": [{"field": "seed", "values": [1]}]}]}
+    )
+    assert f"which want {NARROW_PX:g} px" in " ".join(small_image_doubts(small, small.bases(Path())))
+    page = (Path(__file__).parents[3] / "assets/help/readout.md").read_text()
+    assert f"{NARROW_PX:g} to 6 px measure well" in page
 
 
 def test_distances_are_in_the_unit_that_fields_show(monkeypatch: pytest.MonkeyPatch) -> None:

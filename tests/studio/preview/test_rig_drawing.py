@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from render.base.pose import Pose, transform_points
+from render.scene.motion import Turntable
 from render.scene.scene import SceneObject
 from render.scene.shape import Plane
 from studio.preview.preview import Look, Preview
@@ -19,6 +20,7 @@ from studio.preview.rig_drawing import (
     image_corners,
     joined,
     reach_of,
+    turning,
     working_volume,
 )
 from studio.project.document import replaced
@@ -119,3 +121,23 @@ def test_the_grid_has_round_steps_and_covers_the_scene() -> None:
         assert round(step / 10.0 ** np.floor(np.log10(step) + 1e-9), 6) in (1, 2, 5)
         assert lines[..., 0].min() < -size and lines[..., 1].max() > size
         assert 10 <= len(lines) <= 60
+
+
+@pytest.mark.parametrize("step", [0.2, -0.2])
+def test_a_turntable_s_axis_goes_through_the_part_and_its_arrow_the_way_of_a_step(step: float) -> None:
+    motion = Turntable(centre=(0.1, 0.2, 0.05), axis=(1.0, -2.0, 5.0), angle_step=step, steps=9)
+    low, high = np.array([-0.1, 0.0, 0.0]), np.array([0.3, 0.4, 0.2])
+    points, lines = turning(motion, low, high, 0.01)
+    (first, last), axis = points[:2], np.array(motion.axis) / np.linalg.norm(motion.axis)
+    assert np.linalg.norm(np.cross(last - first, axis)) < 1e-12
+    assert np.linalg.norm(np.cross(first - np.array(motion.centre), axis)) < 1e-12
+    corners = np.array(np.meshgrid(*np.stack([low, high]).T)).reshape(3, -1).T @ axis
+    assert first @ axis < corners.min() and last @ axis > corners.max()
+    # every chord of the arc goes on as the motion's own step moves its beginning
+    for begin, end in lines[1:-2]:
+        moved = transform_points(motion.displacement(1), points[begin : begin + 1])[0] - points[begin]
+        assert moved @ (points[end] - points[begin]) > 0.0
+    tip, ends = points[lines[-1][0]], points[[line[1] for line in lines[-2:]]]
+    onward = transform_points(motion.displacement(1), tip[None])[0] - tip
+    assert np.all((ends - tip) @ onward < 0.0), "an arrow's head lies behind its tip"
+    assert len(turning(motion.model_copy(update={"angle_step": 0.0}), low, high, 0.01)[1]) == 1

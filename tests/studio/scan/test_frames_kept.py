@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from analysis.cloud import read_ply
-from render.base.errors import InputError
+from render.base.errors import Cancelled, InputError
 from render.output.frame_files import read_frame
 from studio.project.document import replaced
 from studio.project.project import Project
@@ -96,6 +96,22 @@ def test_what_cannot_be_done_without_frames_is_refused_before_anything_is_comput
     with pytest.raises(InputError, match="leaves nothing"):
         scan(file, tmp_path / "out", frames="none", measure=False)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("stop", ["asked", "by Ctrl-C"])
+def test_a_stopped_scan_without_frames_says_that_nothing_is_kept(file: Path, tmp_path: Path, stop: str) -> None:
+    """It said that no file was left half-written, which left one to look for the points of what was done."""
+    measured: list[int] = []
+
+    def each(result) -> None:
+        measured.append(result.step)
+        if stop == "by Ctrl-C":
+            raise KeyboardInterrupt
+
+    listener = Listener(cancelled=lambda: bool(measured), measured=each)
+    with pytest.raises(Cancelled, match=r"nothing is kept.*1 of 2 were measured.*--resume has nothing.*--frames band"):
+        scan(file, tmp_path / "out", listener, frames="none")
+    assert measured == [0] and not list((tmp_path / "out").glob("points.*"))
 
 
 def test_frames_of_a_band_are_gone_on_with_as_a_band_and_rendered_anew_for_all(

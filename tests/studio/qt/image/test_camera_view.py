@@ -209,6 +209,19 @@ def test_the_profile_shows_the_pixels_of_the_row_and_meets_them(qtbot, made):
     assert "true" in made.profile.text.text() and "px" in made.profile.text.text()
 
 
+def test_what_the_profile_was_zoomed_to_goes_with_its_project(qtbot, made):
+    session, profile, shown = made.session, made.profile, made.session.shown
+    view = profile.plot.getPlotItem().getViewBox()
+    at_first = view.viewRange()[0]
+    profile.follow.setChecked(False)
+    profile.plot.setXRange(2.0, 3.0, padding=0.0)
+    profile.refresh()
+    assert view.viewRange()[0] == [2.0, 3.0], "it is kept while the project is the same"
+    session.replace_document(Document(session.project, None))
+    session.add_render(shown)
+    assert view.viewRange()[0] == at_first and not profile.follow.isChecked()
+
+
 def test_a_row_without_a_position_says_why(qtbot, made):
     line = made.session.shown.measurements["likelihood"][0].line
     empty = np.flatnonzero(~line.valid[:, 0])

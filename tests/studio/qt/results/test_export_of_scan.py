@@ -29,6 +29,7 @@ from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.results.scan_again import KEY, ScanAgain
 from studio.qt.results.scan_bar import OLD, ScanBar
 from studio.qt.shell.file_actions import _scanned
+from studio.runtime.jobs import Job
 from studio.runtime.preferences import PreferencesFile
 from studio.scan.scan_folder import open_folder
 from tests.studio.scan_of_steps import small_scan
@@ -108,6 +109,39 @@ def test_a_report_is_of_all_steps_with_the_measures_of_now(
     assert "This is step 1 of 3 in scan alone." in text
 
 
+@pytest.fixture
+def stages(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, float]]:
+    """What jobs tell of themselves, in its order."""
+    told: list[tuple[str, float]] = []
+    tell = Job._progress
+
+    def listen(job: Job[object], stage: str, done: float) -> None:
+        told.append((stage, done))
+        tell(job, stage, done)
+
+    monkeypatch.setattr(Job, "_progress", listen)
+    return told
+
+
+def check_told_by_frames(told: list[tuple[str, float]]) -> None:
+    """Of each of three frames, in a share of the whole that never goes back: from it the time left is told."""
+    frames = list(dict.fromkeys(stage.split(":")[0] for stage, _ in told if stage.startswith("frame ")))
+    assert frames == ["frame 1 of 3", "frame 2 of 3", "frame 3 of 3"]
+    shares = [done for _, done in told]
+    assert shares == sorted(shares) and len(set(shares)) > 3
+
+
+def test_a_report_or_a_film_of_all_steps_tells_at_which_frame_it_is(
+    bench: Bench, tmp_path: Path, qtbot: QtBot, quick_reports: None, stages: list[tuple[str, float]]
+) -> None:
+    bench.write("export_html", tmp_path / "all.html", qtbot)
+    check_told_by_frames(stages)
+    assert any(stage == "report" for stage, _ in stages)
+    stages.clear()
+    bench.write("export_film", tmp_path / "all.mp4", qtbot)
+    check_told_by_frames(stages)
+
+
 def test_the_logo_lies_beside_the_project_of_now_and_not_where_the_scan_was_run(
     scanned: tuple[Path, Path], tmp_path: Path, qtbot: QtBot, quick_reports: None
 ) -> None:
@@ -144,7 +178,7 @@ def test_a_report_that_is_older_than_a_tolerance_says_so_when_it_is_opened(
 
 
 def test_a_scan_is_measured_again_with_the_measures_of_now(
-    scanned: tuple[Path, Path], tmp_path: Path, qtbot: QtBot
+    scanned: tuple[Path, Path], tmp_path: Path, qtbot: QtBot, stages: list[tuple[str, float]]
 ) -> None:
     """A flatness that was added after the scan is read off its frames, and nothing is rendered."""
     file, folder = tmp_path / "project" / "steps.json", tmp_path / "scan"
@@ -157,6 +191,7 @@ def test_a_scan_is_measured_again_with_the_measures_of_now(
     assert again.actions[KEY].isEnabled()
     again.actions[KEY].trigger()
     qtbot.waitUntil(lambda: bench.session.shown is not before and bench.session.shown is not None)
+    check_told_by_frames(stages)
     assert bench.session.renders == [bench.session.shown] and bench.session.shown.scan is not None
     (kept,) = open_folder(folder).manifest["measures"]
     assert kept["name"] == "top" and kept["value"] is not None

@@ -15,6 +15,7 @@ from pytestqt.qtbot import QtBot
 from analysis.gauges.gauge import Gauge
 from analysis.report.units import percent
 from render.world.world import build_world
+from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.render import Render
 from studio.qt.results.measures_table import shown
@@ -378,3 +379,13 @@ def test_region_and_row_stay_where_the_next_render_has_the_same_scan_lines(
     )
     window.session.add_render(replace(render, number=3, project=turned))
     assert results.region.region is None and results.pinned is None
+
+
+def test_a_range_goes_with_its_project(window: MainWindow, results: ResultsPanel, render: Render) -> None:
+    row = scan_line_in(window)
+    window.session.range_dragged.emit(row - 5.5, row + 5.5)
+    assert results.region.region is not None and window.session.range is not None
+    window.files.replace(Document(window.session.project, None))
+    window.session.add_render(replace(render))
+    assert results.region.region is None and window.session.range is None
+    assert not any(span.isVisible() for plot in (results.rows, results.profile) for span in plot.spans)

@@ -325,8 +325,15 @@ def test_the_object_of_the_report_is_chosen_from_those_that_there_are(session: S
 def test_a_logo_that_cannot_be_shown_is_told_at_its_field(session: Session, inspector: Inspector) -> None:
     session.select(("delivery",))
     assert not inspector.problem.isVisibleTo(inspector)
-    session.set(("delivery", "logo"), "/somewhere/else/logo.png")
-    assert "/somewhere/else/logo.png is not shown" in inspector.problem.text()
+    for outside in ("/somewhere/else/logo.png", "../logo.png", "C:\\logo.png"):
+        session.set(("delivery", "logo"), outside)
+        told = inspector.problem.text()
+        assert told.startswith(f"The logo {outside} is not shown: it lies outside of the project's folder")
+        assert "allowed: a PNG or JPEG in that folder" in told and "choose it by the button …" in told
+        assert "delivery.logo" not in told, "a key of the file is no place in the window"
+    (session.document.root / "logo.png").write_text("no image")
+    session.set(("delivery", "logo"), "logo.png")
+    assert inspector.problem.text() == "The logo logo.png is not shown: it is neither a PNG nor a JPEG."
     session.set(("delivery", "logo"), "")
     assert not inspector.problem.isVisibleTo(inspector)
 

@@ -77,6 +77,20 @@ def test_over_the_turntable_and_on_top_of_another_part_by_a_click_each(
     assert session.project.scene.objects[1].T_world_object.translation[:2] == pytest.approx((0.0, 0.0), abs=1e-6)
 
 
+def test_what_is_on_top_of_a_plane_that_leans_is_not_said_to_stand_in_it(
+    session: Session, inspector: Inspector, part: list[str], qtbot: QtBot
+) -> None:
+    bar, floor = inspector.mesh_bar, session.project.scene.objects[0]
+    session.set((*OBJECTS, 0, "T_world_object"), Pose(rotation=(0.2, 0.1, 0.0)))
+    session.set((*OBJECTS, 1, "T_world_object"), Pose(rotation=(0.3, 0.5, 0.7)))
+    session.select((*OBJECTS, 1))
+    said = f"May stand in {floor.name}: their boxes overlap"
+    qtbot.waitUntil(lambda: said in bar.told.text())
+    qtbot.mouseClick(bar.top, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: live(session).look.project is session.project and not live(session).is_loading)
+    assert bar.told.text().startswith("2 x 2 x 2 mm") and "May stand in" not in bar.told.text()
+
+
 def test_a_file_takes_the_place_of_any_object_s_shape(
     session: Session, inspector: Inspector, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
 ) -> None:

@@ -12,6 +12,7 @@ from render.base.errors import Cancelled
 from render.scene.motion import LinearStage
 from studio.project.document import Document
 from studio.qt.core.jobs import BUSY, RENDER
+from studio.qt.core.scan_progress import share
 from studio.qt.render import motion_panel
 from studio.qt.render.motion_panel import MotionPanel
 from studio.qt.shell.window import MainWindow
@@ -66,6 +67,24 @@ def test_a_project_that_moves_has_the_panel_behind_design_whenever_it_is_set_up(
     qtbot.waitUntil(lambda: not window.docks["motion"].isHidden())
 
 
+def test_the_tab_that_was_in_front_is_so_again_after_another_workspace(window: MainWindow, qtbot: QtBot) -> None:
+    def wait_for_front(key: str) -> None:
+        qtbot.waitUntil(lambda: not window.docks["motion"].isHidden())
+        qtbot.waitUntil(lambda: not window.panels[key].visibleRegion().isEmpty())
+
+    window.session.set(("scene", "motion"), LinearStage(step=(0.001, 0.0, 0.0), steps=4))
+    wait_for_front("readout")
+    for chosen, behind in (("motion", "readout"), ("readout", "motion"), ("motion", "readout")):
+        window.docks[chosen].raise_()  # as a click on its tab does
+        wait_for_front(chosen)
+        for away in ("measure", "study"):
+            window.switch_to(away)
+            assert window.docks["motion"].isHidden()
+        window.switch_to("setup")
+        wait_for_front(chosen)
+        assert window.panels[behind].visibleRegion().isEmpty()
+
+
 def test_a_scan_that_was_stopped_goes_on_as_the_message_says(
     window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -109,7 +128,7 @@ def test_the_frames_that_are_there_do_not_foretell_the_time_left(
 ) -> None:
     motion = endless
     window.session.set(("scene", "motion"), LinearStage(step=(0.001, 0.0, 0.0), steps=4))
-    for expected in (0.0, motion_panel.share(FRAMES, 0.5)):
+    for expected in (0.0, share(FRAMES, 0.5)):
         job = motion.run_into(tmp_path) if motion.stopped is None else motion.resume()
         assert job is not None and job.there == expected
         for i in (0, 1, 3):

@@ -50,6 +50,13 @@ def test_of_a_motion_it_says_that_one_step_is_measured(panel: StudyPanel, qtbot:
     qtbot.waitUntil(lambda: "step 1 of 20 alone" in panel.told.text())
 
 
+def test_before_a_cell_was_timed_it_says_so_and_what_tells(panel: StudyPanel) -> None:
+    assert panel.time.isVisible() and f"not timed yet ({panel.time.text()} measures" in panel.told.text()
+    timed = estimate_text(Estimate(12, 3, 0, 60.0, 1_000_000), 2)
+    assert "about 30 s on 2 processors" in timed and "not timed" not in timed
+    assert "not timed" not in estimate_text(Estimate(0, 0, 0, None, 1_000_000), 2), "nothing is to come"
+
+
 def test_while_it_runs_only_what_is_left_is_told(
     panel: StudyPanel, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

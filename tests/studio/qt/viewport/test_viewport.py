@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from render.base.pose import Pose
+from render.scene.motion import LinearStage, NoMotion, Turntable
 from render.scene.shape import Box
 from studio.editing.placement import target
 from studio.editing.units import SHOWN
@@ -23,6 +24,7 @@ from studio.project.templates import template_folder
 from studio.qt.core import theme
 from studio.qt.core.session import Session
 from studio.qt.viewport.viewport import Viewport
+from tests.studio.qt.viewport.viewport_hands import pixel
 
 SAMPLE = Path(__file__).parents[4] / "assets/projects/plane/project.json"
 CAMERA, LASER, PLATE, BOX = (
@@ -335,6 +337,23 @@ def test_everything_is_in_view_lamps_as_well(viewport: Viewport) -> None:
     for light in scene.lights:
         x, y = viewport.view.eye.project(light.T_world_light.matrix[None, :3, 3], viewport.view.pixels)[0]
         assert 0.0 <= x <= width and 0.0 <= y <= height
+
+
+def test_the_axis_of_a_turntable_is_drawn_and_neither_picked_nor_framed(viewport: Viewport, qtbot: QtBot) -> None:
+    scene, session = viewport.scene, viewport.session
+    axis, low, high = scene._turning, *scene.bounds(viewport.live.look)
+    assert axis.data.n_points == 0
+    for motion, drawn in ((LinearStage(steps=5), False), (Turntable(centre=(0.02, 0.0, 0.0), steps=5), True)):
+        session.set(("scene", "motion"), motion)
+        qtbot.waitUntil(lambda: viewport.live.look.project is session.project)
+        assert (axis.data.n_points > 0) == drawn
+    assert np.array_equal(scene.bounds(viewport.live.look), (low, high))
+    top = pixel(viewport, axis.data.points[1])
+    found = viewport.path_at(top.x(), top.y())
+    session.set(("scene", "motion"), NoMotion())
+    qtbot.waitUntil(lambda: viewport.live.look.project is session.project)
+    assert axis.data.n_points == 0
+    assert viewport.path_at(top.x(), top.y()) == found, "a click there means what is behind it"
 
 
 def test_the_ground_is_labelled_in_the_unit_that_lengths_are_shown_in(
