@@ -9,7 +9,8 @@ from analysis.gauges.flatness import Cells, Form, cells, flatness
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.parts import on_ground
 from analysis.gauges.profile import Profile
-from analysis.gauges.read import MANY, NAN, Reading
+from analysis.gauges.read import NAN, Reading
+from analysis.gauges.region_doubts import MANY
 from render.base.arrays import Float
 
 BESIDE = "in {} of the steps its region lies on the plane that parts stand on: these are left out"

@@ -12,7 +12,7 @@ from analysis.gauges.area import area_above, section, unseen, without_unsure
 from analysis.gauges.between_edges import along_what, between_edges, sampling_sigma
 from analysis.gauges.edge import NOT_IN_TRUTH, Edge, edge_of
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
-from analysis.gauges.gauge import LEFT_OUT, MOST_GAUGES, REGIONS, Gauge, Verdict
+from analysis.gauges.gauge import MOST_GAUGES, REGIONS, Gauge, Verdict
 from analysis.gauges.oblique import (
     LEAST_OBLIQUE,
     lean_off_a_ball,
@@ -24,6 +24,7 @@ from analysis.gauges.oblique import (
 )
 from analysis.gauges.parts import is_stray, on_ground, parts_of
 from analysis.gauges.profile import Profile
+from analysis.gauges.region_doubts import region_doubt
 from analysis.gauges.undetermined import undetermined
 from render.base.arrays import Float
 
@@ -42,11 +43,6 @@ MISFITS = {
     "edge_to_edge": "points miss the straight line of a surface that ends there by {:.0f} times their sigma: where it "
     "is no plane, take regions that reach less far from its edge",
 }
-MANY, MOST = 0.1, 1.0 / 3.0
-"""Of a region's points, from which on it is told that its curve leaves so many out, and that it does not fit."""
-FAR_OFF = f"{{}} of the {{}} points in the region {{!r}} are far off its curve and {LEFT_OUT}: is it over an edge?"
-MOST_MISS = "{} of the {} points miss the curve in the region {!r} by far: it is of another shape, or over an edge"
-SWAPPED = "the region {!r} lies on the right of {!r}: drag the two anew, or give their ends anew"
 STRAY = "the exact line does not reach its regions: the value is of stray light or noise"
 NO_TRUTH = "; the exact line does not reach there either, so that the area has no truth"
 AS_DRAGGED = (
@@ -135,7 +131,7 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
     remark = STRAY if stray else remark
     if not remark and ratio > MISFIT:
         remark = MISFITS.get(gauge.kind, OTHER_SHAPE).format(ratio)
-    remark = remark or _swapped(gauge) or _left_out(gauge, measured, fits)
+    remark = remark or region_doubt(gauge, measured, fits)
     as_dragged = gauge.kind == "point_to_point" and value < math.sqrt(2.0) * _between_middles(gauge)
     told = AS_DRAGGED if as_dragged else along_what(edges) if edges and not stray else ""
     remark = "; ".join(one for one in (remark, told) if one)
@@ -149,27 +145,6 @@ def _between_middles(gauge: Gauge) -> float:
     """m, across the fan, of the two regions."""
     (low, high), (other_low, other_high) = gauge.regions
     return 0.5 * abs(other_low + other_high - low - high)
-
-
-def _swapped(gauge: Gauge) -> str:
-    """In words, that what is called left lies on the right; empty: it does not."""
-    left, right = REGIONS[gauge.kind][-2:] if len(gauge.regions) > 1 else ("", "")
-    swapped = left.startswith("left") and sum(gauge.regions[-2]) > sum(gauge.regions[-1])
-    return SWAPPED.format(left, right) if swapped else ""
-
-
-def _left_out(gauge: Gauge, profile: Profile, fits: Sequence[Fit]) -> str:
-    """In words, of which region many points are not in the curve; empty: of none."""
-    told, most = "", MANY
-    for k, (name, region) in enumerate(zip(REGIONS[gauge.kind], gauge.regions, strict=True)):
-        if (gauge.kind != "step" and k >= len(fits)) or gauge.kind == "edge_to_edge":
-            continue  # of the second region of an area no curve is fitted, and an edge is to be reached over
-        there = profile.weight(*region) > 0.0
-        of_all, missing = np.count_nonzero(there), np.count_nonzero(there & ~fits[min(k, len(fits) - 1)].here)
-        if missing > most * of_all:
-            most = missing / of_all
-            told = (FAR_OFF if most < MOST else MOST_MISS).format(missing, of_all, name)
-    return told
 
 
 def _beside_square(one: Reading, profile: Profile) -> Reading:
