@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -166,9 +167,11 @@ def is_scan_of(found: ScanFolder, project: Project) -> bool:
 
 
 def source_of(found: ScanFolder) -> Path | None:
-    """The project file that the scan was made from, if it still says the same."""
-    files = sorted(found.root.glob("*.json"), key=lambda file: (file.name != "project.json", file.name))
-    for file in files[:MOST_FILES]:
+    """The project file that the scan was made from, if it still says the same: where its meshes are, or beside the
+    scan, where a project that was saved only after it is likely to be."""
+    folders = dict.fromkeys((found.root.resolve(), found.folder.resolve().parent))
+    files = [sorted(one.glob("*.json"), key=lambda file: (file.name != "project.json", file.name)) for one in folders]
+    for file in chain.from_iterable(some[:MOST_FILES] for some in files):
         try:
             if is_scan_of(found, Project.load(file)):
                 return file

@@ -31,7 +31,7 @@ from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.folders import ask_results_folder, may_replace_scan, unused_name
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner
-from studio.qt.core.open_file import open_file
+from studio.qt.core.report_opener import open_report
 from studio.qt.core.scan_progress import scan_progress, share
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
@@ -279,7 +279,7 @@ class MotionPanel(QWidget):
 
     def _open_report(self) -> None:
         if self.report is not None:
-            open_file(self.session, self.report)
+            open_report(self.session, self.report)
 
     def _follow_step(self) -> None:
         scene, step = self.session.project.scene, self.session.step

@@ -5,18 +5,12 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
-from studio.project.project import READ_OFF
 from studio.qt.core.boxes import ChoiceBox
-from studio.qt.core.open_file import open_file
+from studio.qt.core.report_opener import open_report
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.core.step_bar import StepBar
 from studio.scan.scan_results import ScanResults
-
-OLD = (
-    "This report was written with the scan: measures, tolerances or its first page are others by now. File > Export "
-    "writes one of the project as it is, Measure > Measure the scan again that of the folder"
-)
 
 
 class ScanBar(QWidget):
@@ -79,10 +73,4 @@ class ScanBar(QWidget):
     def _open_report(self) -> None:
         if self.scan is None or self.scan.report is None:
             return
-        open_file(self.session, self.scan.report)
-        render = self.session.shown
-        if render is not None:
-            before = self.steps_of.measured_as(render)
-            now = before.read_as(render.developed_by(self.session.project))
-            if any(getattr(before, name) != getattr(now, name) for name in READ_OFF):
-                self.session.message.emit("warning", OLD)
+        open_report(self.session, self.scan.report)

@@ -131,7 +131,9 @@ def test_the_file_that_was_scanned_is_found_unless_it_was_edited(copy: Path) -> 
     replaced(Project.load(project / "steps.json"), ("sensor", "bits"), 8).save(project / "another.json")
     (project / "broken.json").write_text("{")
     assert source_of(open_folder(copy)) == (project / "steps.json").resolve()
-    (project / "steps.json").unlink()
+    (project / "steps.json").rename(copy.parent / "saved later.json")
+    assert source_of(open_folder(copy)) == (copy.parent / "saved later.json").resolve(), "it lies beside the scan"
+    (copy.parent / "saved later.json").unlink()
     assert source_of(open_folder(copy)) is None
 
 

@@ -20,6 +20,7 @@ from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.actions import Actions
 from studio.qt.core.jobs import JobRunner
+from studio.qt.core.report_opener import OLD, open_report
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.render.develop_panel import DevelopPanel
@@ -27,7 +28,7 @@ from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.heads import measured_otherwise
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.results.scan_again import KEY, ScanAgain
-from studio.qt.results.scan_bar import OLD, ScanBar
+from studio.qt.results.scan_bar import ScanBar
 from studio.qt.shell.file_actions import _scanned
 from studio.runtime.jobs import Job
 from studio.runtime.preferences import PreferencesFile
@@ -174,6 +175,12 @@ def test_a_report_that_is_older_than_a_tolerance_says_so_when_it_is_opened(
     bench.session.set(("delivery", "upper"), 1e-4)
     bench.bar.report.click()
     assert bench.told[-1] == ("warning", OLD)
+    bench.told.clear()
+    open_report(bench.session, tmp_path / "scan" / "report.html")
+    assert bench.told[-1] == ("warning", OLD), "from the panel of the motion as well"
+    bench.told.clear()
+    open_report(bench.session, tmp_path / "another" / "report.html")
+    assert OLD not in [text for _, text in bench.told], "nothing is known of another scan"
     bench.close()
 
 
