@@ -32,10 +32,15 @@ def working_distance(scene: Scene) -> float:
     focus = scene.camera.lens.focus_distance
     if focus is not None and NEAR < focus < FAR:
         return focus
+    ahead = depths_ahead(scene)
+    return float(np.median(ahead)) if ahead else USUAL_DISTANCE
+
+
+def depths_ahead(scene: Scene) -> list[float]:
+    """Of the objects before the camera, m."""
     to_camera = invert(scene.T_world_camera())
     depths = [float((to_camera @ scene.T_world_object(item)[:, 3])[2]) for item in scene.visible_objects]
-    ahead = [depth for depth in depths if NEAR < depth < FAR]
-    return float(np.median(ahead)) if ahead else USUAL_DISTANCE
+    return [depth for depth in depths if NEAR < depth < FAR]
 
 
 def target(scene: Scene) -> Array:

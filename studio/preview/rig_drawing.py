@@ -16,7 +16,7 @@ from render.laser.laser import LineLaser
 from render.scene.lights import Light, RectangleLight
 from render.scene.motion import Turntable
 from render.scene.scene import Scene
-from studio.editing.placement import rounded, working_distance
+from studio.editing.placement import depths_ahead, rounded, working_distance
 from studio.preview.preview import Fan
 
 Int = NDArray[np.int64]
@@ -27,8 +27,16 @@ MOST_JOINS = 3
 """Crossings of one scan line that a join may step over."""
 FAR_CORNERS = 4.0
 """Working distances to which the frustum's edges are drawn where nothing is in focus."""
+BEYOND = 2.0
+"""Times the distance of the farthest object that a rig is drawn for: a sheet that is aimed past all of them may meet
+the camera's axis at any distance, where there is nothing."""
 ARC_POINTS = 37
 """Of three quarters of a circle."""
+
+
+def drawn_distance(scene: Scene) -> float:
+    """The working distance, m, by which everything of a rig is drawn, as far as there is something."""
+    return min(working_distance(scene), BEYOND * max(depths_ahead(scene), default=np.inf))
 
 
 def image_corners(camera: Camera, depth: float) -> Float:
@@ -47,7 +55,7 @@ def focus_corners(scene: Scene) -> Float:
 
     A corner that meets it nowhere, or far beyond the work, ends at a few working distances.
     """
-    camera, distance = scene.camera, working_distance(scene)
+    camera, distance = scene.camera, drawn_distance(scene)
     plane, corners = camera.focus_plane, image_corners(camera, 1.0)
     if not plane[:3].any():
         return corners * distance
@@ -64,7 +72,7 @@ def frustum(scene: Scene) -> tuple[Float, list[tuple[int, int]]]:
 
 def image_plane(scene: Scene) -> Float:
     """(7, 3) a small image plane before the camera, camera frame, and over its upper edge a triangle that says "up"."""
-    corners = image_corners(scene.camera, 0.14 * working_distance(scene))
+    corners = image_corners(scene.camera, 0.14 * drawn_distance(scene))
     width = np.linalg.norm(corners[1] - corners[0])
     middle, up = (corners[0] + corners[1]) / 2, np.array([0.0, -1.0, 0.0])
     along = np.array([1.0, 0.0, 0.0])
@@ -81,7 +89,7 @@ def fan_points(fan: Fan, reach: float) -> Float:
 def reach_of(scene: Scene, fans: list[Fan]) -> float:
     """How far to draw light that hits nothing."""
     hits = [float(fan.distance[np.isfinite(fan.distance)].max(initial=0.0)) for fan in fans]
-    return max(1.2 * working_distance(scene), *hits, 0.0)
+    return max(1.2 * drawn_distance(scene), *hits, 0.0)
 
 
 def joined(curve: LaserCurve) -> Int:
@@ -203,7 +211,7 @@ def _clipped(polygon: Float, inward: Float) -> Float:
 
 def glyph_size(scene: Scene) -> float:
     """m; half the width of the boxes that stand for camera and lasers."""
-    return max(0.018 * working_distance(scene), 1e-4)
+    return max(0.018 * drawn_distance(scene), 1e-4)
 
 
 def bounds_of(points: Float) -> tuple[Float, Float]:

@@ -73,7 +73,8 @@ class PartSteps:
             return ""
         scan, told = render.scan, f"Of step {render.frame.step + 1} of {render.scan.count}."
         if gauge is not None and gauge.of_scan:
-            return f"Of all {scan.count} steps together, as measured last." if kept else ""
+            others = " Values of other measures are those of the worst step." if len(gauges) > 1 else ""
+            return f"It is of all {scan.count} steps together, as measured last.{others}" if kept else ""
         otherwise = scan.measured_as.measured_in != self._session.project.measured_in
         if otherwise and scan.measured_as.measures:
             return f"{told} All steps were measured in another section: {AGAIN}."

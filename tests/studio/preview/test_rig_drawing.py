@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from render.base.pose import Pose, transform_points
 from render.scene.motion import Turntable
 from render.scene.scene import SceneObject
 from render.scene.shape import Plane
+from studio.editing.placement import working_distance
 from studio.preview.preview import Look, Preview
 from studio.preview.rig_drawing import (
     fan_points,
     focus_corners,
+    glyph_size,
     grid,
     hidden_line,
     image_corners,
@@ -40,6 +44,18 @@ def card(look: Look) -> SceneObject:
     T = look.scene.T_world_laser(0)
     pose = Pose.from_matrix(T) @ Pose(translation=(0.0, 0.05, 0.4))
     return SceneObject(name="card", shape=Plane(width=0.02, height=0.05), T_world_object=pose)
+
+
+def test_a_sheet_that_is_aimed_past_everything_leaves_the_rig_as_large_as_it_was() -> None:
+    """The boxes of camera and laser were hundreds of pixels wide, and the part was a speck."""
+    scene = look_at("plane").scene
+    (laser,) = scene.lasers
+    turned = Rotation.from_rotvec(laser.T_rig_laser.rotation) * Rotation.from_rotvec((0.0, math.radians(12.0), 0.0))
+    pose = laser.T_rig_laser.model_copy(update={"rotation": tuple(turned.as_rotvec())})
+    project = Project.load(PROJECTS / "plane" / "project.json")
+    aimed = replaced(project, ("scene", "rig", "lasers", 0, "T_rig_laser"), pose).scene
+    assert working_distance(aimed) > 10.0 * working_distance(scene)
+    assert glyph_size(scene) < glyph_size(aimed) < 2.5 * glyph_size(scene)
 
 
 def test_the_sheet_ends_at_what_it_meets_first() -> None:

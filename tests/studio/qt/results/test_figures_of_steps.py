@@ -159,7 +159,7 @@ def test_steps_without_measures_were_not_measured_in_another_section(
 def test_a_flatness_is_of_all_steps(panel: ResultsPanel) -> None:
     told = panel.part.told
     panel.part.table.selectRow(1)
-    assert told.text().startswith("Of all 3 steps together, as measured last.") and "step 1" not in told.text()
+    assert told.text().startswith("It is of all 3 steps together, as measured last.") and "step 1" not in told.text()
     panel.session.set(("measures", 1, "regions"), ((-0.15, 0.2),))
     assert "as measured last" not in told.text() and "Measure the scan again" in told.text()
 
