@@ -119,7 +119,7 @@ class Measuring:
     def remarks(self) -> list[str]:
         """What the results say beyond themselves, and images that the chooser did not judge."""
         unlike = [note for note in self.notes() if UNLIKE in note]
-        return [*result_remarks(self.record), *unlike, *self.lacks.values()]
+        return [*self.lacks.values(), *result_remarks(self.record), *unlike]
 
     def write_points(self, out: Path) -> list[Path]:
         """points.ply and points.csv of all frames and lasers, by the project's method, at the first step's pose.

@@ -43,7 +43,7 @@ def frame_remarks(project: Project, frame: Frame, measurements: Measurements, do
     unread = project.model_copy(update={"measures": ()})  # no remark is on the part's measures
     with closing(record_of(project.scene, [frame_result(unread, frame, measurements)])) as record:
         lacks = image_lacks(project, best(measurements, project))
-        said = [*result_remarks(record), *lacks.values()]
+        said = [*lacks.values(), *result_remarks(record)]  # what the sensor leaves out is more than all others
         of_all = [OF_ALL_LASERS] if said and len(project.scene.lasers) > 1 else []
         return [*doubts, *map(in_words, frame.warnings), *of_all, *said]
 

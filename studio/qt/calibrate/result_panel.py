@@ -35,10 +35,10 @@ BOARD_WARP = (
     "along its columns, each with its sigma. It is found with everything else; a flat board has 0.</p>"
 )
 COLUMNS = (
-    "rms and worst over the volume, common to all points, as the calibration tells them of itself; line: what the "
-    "noise of the line adds to each"
+    "sigmas by which the calibration tells depth to be off, common to all points: rms of the volume, and at its worst "
+    "place; line: what the noise of the line adds to each"
 )
-TRUE_COLUMN = "; true: against the scanner that took the views"
+TRUE_COLUMN = "; true: how far it is off the scanner that took the views, rms"
 
 
 class CalibrationPanel(QWidget):
@@ -106,7 +106,7 @@ def page(solved: Solved, target_um: float | None, note: str = "") -> str:
     if result.faults:
         parts.append("<p></p>")
     if result.depth:
-        header = ["Depth error / µm", "rms", "worst", "line", *(["true"] if solved.true else [])]
+        header = ["Depth sigma / µm", "rms", "worst place", "line", *(["true"] if solved.true else [])]
         rows = depth_rows(result, None if solved.true is None else list(solved.true), solved.names)
         parts.append(_table(header, rows))
         told = f"{COLUMNS}{TRUE_COLUMN if solved.true else ''}"
@@ -132,7 +132,7 @@ def own_page(project: Project, found: Sequence[OwnDepth] | None, problem: str = 
         parts.append(f"{muted}{escape(problem or WORKING)}</p>")
     parts.append("<p></p>")
     if found:
-        parts += [_table(["Depth error / um", "rms", "worst", "true"], own_depth_rows(project, found)), "<p></p>"]
+        parts += [_table(["Depth sigma / um", "rms", "worst place", "true"], own_depth_rows(project, found)), "<p></p>"]
         notes = [TRUE, *notes] if any(one.true is not None for one in found) else notes
     parts.append(_table(["Parameter", "value", "sigma"], own_rows(project)))
     parts += ["<p></p>", f"{muted}{escape(' '.join(notes))}</p>"]

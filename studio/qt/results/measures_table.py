@@ -15,7 +15,7 @@ from studio.scan.result_series import COVERED, OUTLIERS, UNCERTAINTY, readable_u
 
 HONEST = 88.0
 """Percent within 2 sigma below which more than noise moves the line; the report remarks on it from there as well."""
-USUAL = "and than five times the usual error or half the line's width"
+USUAL = "and also more than five robust sigmas, or half the line's width where that is less"
 COUNTED = "Completeness counts them unless they are outliers in the image too; those of a wrong calibration are not."
 EXPLAINED = {
     "Points": "Points measured.",
@@ -30,9 +30,11 @@ EXPLAINED = {
     "RMSE": "Bias and sigma together: the root of the mean squared error.",
     "Robust sigma": "The spread as it would be without outliers.",
     "95 % within": "95 % of the errors are smaller than this.",
-    OUTLIERS["depth"]: f"Points whose depth is off by more than a pixel makes, {USUAL}. {COUNTED}",
-    OUTLIERS["surface"]: f"Points that are off the surface by more than a pixel makes, {USUAL}. {COUNTED}",
-    OUTLIERS["position"]: f"Peaks that are off the line by more than a pixel, {USUAL}. Completeness leaves them out.",
+    OUTLIERS["depth"]: f"Points whose error in depth is more than one pixel makes, {USUAL}. {COUNTED}",
+    OUTLIERS["surface"]: f"Points whose distance from the surface is more than one pixel makes, {USUAL}. {COUNTED}",
+    OUTLIERS[
+        "position"
+    ]: f"Peaks whose distance from the line is more than one pixel, {USUAL}. Completeness leaves them out.",
     COVERED: "Share of the errors within twice the predicted sigma, of the image's noise and, where points are made "
     "with a calibration, of that: 95 % where nothing else moves the line. Less: texture or edges under it, or too few "
     "pixels. A calibration's error is common to all points, so that all of them may be within or without.",

@@ -39,7 +39,7 @@ def test_it_is_told_when_the_project_is_opened_again(qtbot: QtBot, solved: Desk)
     result = solved.work.solved.result
     told = reopened(qtbot, solved)
     name = solved.session.project.scene.lasers[0].name
-    assert solved.work.solved is None and told.startswith(OWN) and "Depth error / µm" in told
+    assert solved.work.solved is None and told.startswith(OWN) and "Depth sigma / µm" in told
     for row in parameter_rows(result, (name,)):
         assert row[0] == WARP or all(part in told for part in row)
     assert "2448 x 2048" in told and LINE not in told
