@@ -259,7 +259,7 @@ class StudyWork(LongWork):
             self.tell_failure(self._said(error))
             return
         grew = partial(self._grew.emit, self.folder)
-        work = running(run_into, self.folder, study, bases, self.engine, grew, self._take_start)
+        work = running(run_into, self.folder, study, bases, self.engine, grew, self._take_start, self._take_there)
         self.tell_failure("")
         self._run_bases = bases
         self.promised = self.estimate.wall(self.processors) if self.estimate is not None else None
@@ -328,6 +328,10 @@ class StudyWork(LongWork):
         """On the job's thread: by it the time left is of what cells take, and not of workers that start."""
         if self.job is not None:
             self.job.start_up = seconds
+
+    def _take_there(self, share: float) -> None:
+        if self.job is not None:
+            self.job.there = share
 
     def _take_growth(self, folder: Path, found: Found) -> None:
         if folder == self.folder:
