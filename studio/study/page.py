@@ -135,8 +135,13 @@ def _breakdown_sentence(found: Broken, answer: Answer, labels: dict[str, str]) -
         return f"{name}: {limit} holds as far as {parameter} {shown(ended.last_good)}."
     if ended.ending == "fails":
         return f"{name}: {limit} is not kept even at {parameter} {shown(ended.first_bad)}."
+    low, high = sorted((ended.last_good, ended.first_bad))
     interval = f"95 % interval {shown(ended.low)} to {shown(ended.high)}"
-    return f"{name}: {limit} holds up to {parameter} {shown(ended.value)} ({interval}); beyond, {found.cause}."
+    if not found.ended:
+        interval = f"so far between {shown(low)} and {shown(high)}"
+    downwards = ended.first_bad < ended.last_good
+    holds, past = ("needs at least", "below that") if downwards else ("holds up to", "above that")
+    return f"{name}: {limit} {holds} {parameter} {shown(ended.value)} ({interval}); {past}, {found.cause}."
 
 
 def _bound_sentence(found: Bound, answer: Answer, labels: dict[str, str]) -> str:
