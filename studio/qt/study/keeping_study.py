@@ -18,6 +18,7 @@ NAMES_PROJECT = (
     "A study's file names that of its project, and this project is in no file as it is now. Save the study beside it "
     "then, or in a folder above."
 )
+ENDING = ".json"
 FILES = "Studies (*.json);;All files (*)"
 LOST = "It is in no file as it is now: without saving, its sweeps are lost. What was measured stays in its folder."
 
@@ -39,12 +40,11 @@ def ask_and_save(work: StudyWork, parent: QWidget) -> bool:
     """Ask where, and save there; False: it is in no file."""
     if not _may_be_saved(work, parent):
         return False
-    suggestion = str(work.session.place / f"{work.draft['name']}.json")
-    chosen, _ = QFileDialog.getSaveFileName(parent, "Save the study", suggestion, FILES)
-    if not chosen:
+    file = _ask_where(parent, work.session.place / f"{work.draft['name']}.json")
+    if file is None:
         return False
-    work.session.chose(Path(chosen))
-    return save(work, Path(chosen))
+    work.session.chose(file)
+    return save(work, file)
 
 
 def may_be_replaced(work: StudyWork, parent: QWidget) -> bool:
@@ -60,6 +60,20 @@ def may_go(work: StudyWork, parent: QWidget, *, quits: bool) -> bool:
     """
     stays = not quits and (work.loaded or work.running or work.found is not None)
     return bool(work.kept_with_project or stays) or may_be_replaced(work, parent)
+
+
+def _ask_where(parent: QWidget, suggestion: Path) -> Path | None:
+    """With the ending that a study is opened by. The dialog asks before it gives a file that is there already, which
+    one is only by the ending that is added: it is shown once more.
+    """
+    chosen, _ = QFileDialog.getSaveFileName(parent, "Save the study", str(suggestion), FILES)
+    if not chosen:
+        return None
+    path = Path(chosen)
+    if path.suffix.lower() == ENDING:
+        return path
+    ended = path.with_name(path.name + ENDING)
+    return _ask_where(parent, ended) if ended.exists() else ended
 
 
 def _unsaved(work: StudyWork) -> bool:

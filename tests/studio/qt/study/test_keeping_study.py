@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QMenu
+from PySide6.QtWidgets import QFileDialog, QMenu
 from pytestqt.qtbot import QtBot
 
 from studio.project.document import Document
@@ -132,3 +132,32 @@ class TestAnotherStudyComes:
         assert desk.work.draft["name"] == "quick"
         choose(desk, "New study")
         assert desk.work.sweep["vary"] == [] and not asked
+
+
+class TestItsFile:
+    @pytest.mark.parametrize("name", ["myquick", "myquick.v2", "myquick.json"])
+    def test_it_has_the_ending_by_which_it_is_opened(
+        self, desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+    ) -> None:
+        desk.small([2.0, 20.0])
+        choose_file(monkeypatch, tmp_path / name)
+        choose(desk, "Save the study…")
+        assert (tmp_path / f"{name.removesuffix('.json')}.json").exists()
+        assert name.endswith(".json") or not (tmp_path / name).exists()
+
+    def test_one_that_is_there_is_asked_about_by_its_whole_name(
+        self, desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """The dialog asked about a file without the ending, which was not there."""
+        desk.small([2.0, 20.0])
+        (tmp_path / "mine.json").write_text("another's")
+        offered: list[str] = []
+        answers = iter((str(tmp_path / "mine"), ""))
+
+        def ask(parent: object, title: str, suggestion: str, kinds: str) -> tuple[str, str]:
+            offered.append(Path(suggestion).name)
+            return next(answers), ""
+
+        monkeypatch.setattr(QFileDialog, "getSaveFileName", ask)
+        choose(desk, "Save the study…")
+        assert offered[1] == "mine.json" and (tmp_path / "mine.json").read_text() == "another's"
