@@ -37,6 +37,7 @@ from studio.study.draft import new_sweep, varies_nothing
 from studio.study.estimate import Estimate
 from studio.study.study import Study, ready_made
 
+NOT_OPEN = "its own, not the open project"
 EMPTY = "What it takes is told here as soon as every sweep varies a field."
 
 
@@ -56,6 +57,8 @@ class StudyPanel(QWidget):
         self.files.setMenu(menu)
         self.base = ChoiceBox()
         self.base.setToolTip("The project that every cell is a variation of")
+        self.not_open = QLabel(NOT_OPEN)
+        self.not_open.setObjectName("muted")
         self.laser = ChoiceBox()
         self.laser.setToolTip("The laser whose line every cell measures")
         self.sweeps = ChoiceBox()
@@ -107,6 +110,7 @@ class StudyPanel(QWidget):
         if draft["base"] in work.loaded:
             self.base.addItem(f"{draft['base'].replace('_', ' ')}, as in the study")
             self.base.setCurrentIndex(1)
+        self.not_open.setVisible(draft["base"] in work.loaded)
         self._show_lasers()
         self.sweeps.clear()
         self.sweeps.addItems([sweep["name"] for sweep in draft["sweeps"]])
@@ -269,6 +273,7 @@ class StudyPanel(QWidget):
         of.addWidget(self.base, 1)
         of.addWidget(self.laser)
         form.addRow("Of", of)
+        form.addRow("", self.not_open)
         form.addRow("Sweep", sweeps)
         runs = QHBoxLayout()
         runs.addWidget(self.repeats)

@@ -175,7 +175,10 @@ class TestDraft:
         assert desk.panel.sweeps.count() == 6 and desk.work.project().name != ""
         qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.cells > 600)
         assert set(desk.work.loaded) == {"dark_plate", "shiny_weld_seam"}
+        told = desk.panel.not_open
+        assert told.isVisible() and "not the open project" in told.text(), "“Of” changed without a word"
         desk.work.use_open_project()
+        assert told.isHidden()
         assert desk.work.draft["base"] == "plane.json" and desk.work.project() is desk.session.project
 
     def test_a_ready_made_study_is_saved_elsewhere_with_changes_of_ones_own(self, desk: Desk, tmp_path: Path) -> None:
