@@ -74,7 +74,7 @@ def run_into(
                     store,
                     engine=engine,
                     shard=part,
-                    progress=lambda done, known: progress("cells", done / max(known, 1)),
+                    progress=lambda done, known, to_come: progress("cells", done / max(known + to_come, 1)),
                     cancelled=cancelled,
                 )
             except Cancelled:

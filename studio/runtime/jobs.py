@@ -115,7 +115,7 @@ class Job(Generic[Result]):
         enough = 0.01 if self.seconds >= LONG_WORK else SMALL_SHARE
         if self.ended or self.done - self.there < enough * (1.0 - self.there) or self.seconds < EARLIEST_ESTIMATE:
             return None
-        begun, first = self._begun if self.start_up is None else (self.start_up, 0.0)
+        begun, first = self._begun if self.start_up is None else (self.start_up, self.there)
         if self.done <= first:
             return None
         # time that passes since the work told how far it is makes what is left less, not more

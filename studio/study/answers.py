@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from analysis.report.summary import LITTLE
-from analysis.study.breakdown import Breakdown, breakdown
+from analysis.study.breakdown import Breakdown, breakdown, next_values
 from analysis.study.budget import Budget, budget
 from analysis.study.cause import cause
 from analysis.study.intervals import Interval, mean_interval, positive_interval
@@ -52,6 +52,8 @@ class Broken:
     breakdown: Breakdown
     cause: str
     """In a word; empty: it does not break."""
+    ended: bool = True
+    """False: the search still has values to ask for, and knows no more than between which two it breaks."""
 
 
 @dataclass(frozen=True)
@@ -218,7 +220,7 @@ def _broken(
         if ended.ending == "found":
             good, bad = (groups[(value,), method] for value in (search.good, ended.first_bad))
             why = cause(_means(good), _means(bad))
-        found.append(Broken(method, ended, why))
+        found.append(Broken(method, ended, why, not next_values(search, known)))
     return tuple(found)
 
 

@@ -200,7 +200,7 @@ def next_cells(study: Study, bases: Mapping[str, Project], rows: Rows, shard: Sh
 
 def next_of_search(study: Study, number: int, method: str, bases: Mapping[str, Project], rows: Rows) -> list[Cell]:
     """What a search asks for next by one method, measured or not; empty: it is over."""
-    wanted = _next_points(study.sweeps[number], searched(study, number, method, bases, rows))
+    wanted = next_points(study.sweeps[number], searched(study, number, method, bases, rows))
     return [cell for cell in cells_at(study, number, bases, wanted) if cell.method == method]
 
 
@@ -211,7 +211,7 @@ def searched(
     sweep = study.sweeps[number]
     known: dict[Point, np.ndarray] = {}
     while True:
-        wanted = _next_points(sweep, known)
+        wanted = next_points(sweep, known)
         found = {point: _repeats(study, number, method, bases, rows, point) for point in wanted}
         complete = {point: repeats for point, repeats in found.items() if repeats is not None}
         known |= complete
@@ -230,7 +230,8 @@ def on_lattice(sweep: Sweep, known: Mapping[Point, np.ndarray]) -> dict[Node, np
     return {(column[point[0]], row[point[1]]): repeats for point, repeats in known.items()}
 
 
-def _next_points(sweep: Sweep, known: Mapping[Point, np.ndarray]) -> list[Point]:
+def next_points(sweep: Sweep, known: Mapping[Point, np.ndarray]) -> list[Point]:
+    """What a search asks for after the repeats that are known by point; empty: it is over."""
     if sweep.sampling == "bisection":
         return [(value,) for value in next_values(search_of(sweep), along(known))]
     first, second = (one.grid() for one in sweep.vary)

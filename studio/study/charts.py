@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocato
 
 from analysis.report.colour import INK, MUTED, PAPER, method_colour, method_name
 from analysis.report.labels import Name, name_marks
-from analysis.report.style import figure
+from analysis.report.style import WIDTH, figure
 from studio.study.answers import Answer, Spot
 from studio.study.boundary_chart import DASHES, draw_edges
 from studio.study.bounds import Bound
@@ -28,14 +28,16 @@ MOST_IN_LEGEND = 5
 """Methods; more are named at their marks."""
 
 
-def chart(answer: Answer, labels: dict[str, str]) -> Any:
-    """A matplotlib figure of one sweep. labels: of the fields, with their units."""
+def chart(answer: Answer, labels: dict[str, str], size: tuple[float, float] = (WIDTH, 3.4)) -> Any:
+    """A matplotlib figure of one sweep. labels: of the fields, with their units; size: width and height, inches, for
+    which names of marks find their places.
+    """
     if answer.sweep.chart == "budget":
         return budget_figure(answer.budgets[0])
     if answer.sweep.chart in KEPT:
         return (profile_figure if answer.sweep.chart == "profile" else pictures_figure)(answer, shown)
     draw = {"sweep": _sweep, "speed": _speed, "map": _boundary if answer.edges else _map}[answer.sweep.chart]
-    with figure(3.4) as made:
+    with figure(size[1], size[0]) as made:
         axes = made.subplots()
         draw(axes, answer, labels)
         made.supxlabel(_repeats(answer), x=0.99, ha="right", fontsize=6.0, color=MUTED, wrap=True)

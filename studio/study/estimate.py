@@ -9,19 +9,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.study.breakdown import EXTRA
 from studio.project.project import Project
 from studio.study.begin import study_bytes
-from studio.study.cells import Cell, Point, cells_at, check_size, lattice_of, light_key, methods_of, next_cells, points
+from studio.study.cells import (
+    Cell,
+    Point,
+    cells_at,
+    check_size,
+    light_key,
+    methods_of,
+    next_cells,
+    next_points,
+    points,
+    searched,
+)
+from studio.study.left_over import left_over
 from studio.study.one_phase import one_phase_doubts
+from studio.study.searching import most_to_come
 from studio.study.small_images import small_image_doubts
 from studio.study.store import Row
 from studio.study.study import SEARCHES, Study
 from studio.study.tables import CALIBRATING, LOAD, SECONDS, measured_cells
 from studio.study.tasks import tasks
-
-A_COLUMN = 5
-"""Cells of a boundary's column, about."""
 
 NOISE_APART = (
     "Each value takes a render of its own, as well as its noise asks for (goal in depth). With the goal “errors of the "
@@ -65,23 +74,18 @@ def estimate(
     """timed: `costs` by the sweep's name, for sweeps without rows. InputError: a field or value that does not fit."""
     check_size(study)
     missing = next_cells(study, bases, rows)
-    cells, renders, searched, seconds = 0, 0, 0, 0.0
+    cells, renders, to_come, seconds = 0, 0, 0, 0.0
     for number, sweep in enumerate(study.sweeps):
         mine = [cell for cell in missing if cell.sweep == number]
         frames = len(tasks(mine, study.image_scale, study.laser))
-        more = 0
-        if sweep.sampling in SEARCHES and mine:
-            steps = math.ceil(math.log2(1.0 / sweep.tolerance)) + EXTRA
-            if sweep.sampling == "boundary":
-                steps = lattice_of(sweep).columns * A_COLUMN
-            more = steps * study.repeats * len(methods_of(study, sweep))
-        cells, renders, searched = cells + len(mine), renders + frames, searched + more
+        more = _searched(study, number, bases, rows) if sweep.sampling in SEARCHES and mine else 0
+        cells, renders, to_come = cells + len(mine), renders + frames, to_come + more
         cost = _known(study, number, bases, rows) or timed.get(sweep.name)
         if mine:
             # what a search asks for comes one value at a time, so each cell may take a render
             taken = math.nan if cost is None else (frames + more) * cost[0] + (len(mine) + more) * cost[1]
             seconds += taken
-    size = study_bytes(study, len(rows) + cells + searched)
+    size = study_bytes(study, len(rows) + cells + to_come)
     steps = max(base.scene.frame_count for base in bases.values())
     known = None if math.isnan(seconds) else seconds
     doubts = (
@@ -90,7 +94,17 @@ def estimate(
         *_not_shared(missing),
         *_noise_apart(study, missing),
     )
-    return Estimate(cells, renders, searched, known, size, steps, doubts, _left_over(study, bases, rows))
+    return Estimate(cells, renders, to_come, known, size, steps, doubts, left_over(study, bases, rows))
+
+
+def _searched(study: Study, number: int, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> int:
+    """Cells that the searches of a sweep may ask for beside those that they ask for now."""
+    sweep, points = study.sweeps[number], 0
+    for method in methods_of(study, sweep):
+        known = searched(study, number, method, bases, rows)
+        if now := next_points(sweep, known):
+            points += most_to_come(sweep, len(known) + len(now))
+    return points * study.repeats
 
 
 def _not_shared(cells: Sequence[Cell]) -> tuple[str, ...]:
@@ -117,14 +131,6 @@ def _noise_apart(study: Study, cells: Sequence[Cell]) -> tuple[str, ...]:
             return (NOISE_APART,)
         light.add(key)
     return ()
-
-
-def _left_over(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> int:
-    asked: set[str] = set()
-    for number in range(len(study.sweeps)):
-        for cell, _ in measured_cells(study, number, bases, rows):
-            asked |= {cell.key, cell.former_key}
-    return len(rows.keys() - asked)
 
 
 def costs(study: Study, bases: Mapping[str, Project], number: int) -> Costs:

@@ -60,7 +60,7 @@ def found_in(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]
     return Found(study, bases, rows, tuple(answers(study, bases, rows)))
 
 
-def run_into(
+def run_into(  # noqa: PLR0913
     folder: Path,
     study: Study,
     bases: dict[str, Project],
@@ -70,9 +70,10 @@ def run_into(
     cancelled: Callable[[], bool] = lambda: False,
     grew: Callable[[Found], None] = lambda found: None,
     started: Callable[[float], None] = lambda seconds: None,
+    there: Callable[[float], None] = lambda share: None,
 ) -> Found:
     """Measure what is missing, then write tables, charts and page. grew: hears what is found as it grows; started: how
-    many seconds had passed when the first cells were begun.
+    many seconds had passed when the first cells were begun; there: which share of all had been measured before.
 
     InputError: as `begin` and `run_study`. Cancelled: so asked; what has been measured is kept.
     """
@@ -84,10 +85,13 @@ def run_into(
     with begin(folder, study, bases, engine) as store:
         before, next_look = store.count(), 0.0
 
-        def tell(done: int, known: int) -> None:
+        def tell(done: int, known: int, to_come: int) -> None:
             nonlocal next_look
             first = "" if done > before else "; the first ones are under way, or wait for their workers to start"
-            progress(f"{done} of {known} cells{first}", (done - before) / max(known - before, 1))
+            # by what the estimate counts on, so that the time left does not grow with what searches ask for
+            all_cells = max(known + to_come, 1)
+            there(before / all_cells)
+            progress(f"{done} of {'up to ' if to_come else ''}{all_cells} cells{first}", done / all_cells)
             now = time.monotonic()
             if now >= next_look:
                 grew(found_in(study, bases, store.rows()))

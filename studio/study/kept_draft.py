@@ -36,7 +36,7 @@ def keep_draft(
     """
     file = _file(project)
     with contextlib.suppress(OSError):
-        if not any(map(_asks, draft["sweeps"])):
+        if not asks_something(draft):
             file.unlink(missing_ok=True)
             return
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -94,8 +94,9 @@ def _is_draft(draft: Data) -> bool:
     )
 
 
-def _asks(sweep: Data) -> bool:
-    return not varies_nothing({"sweeps": [sweep]})
+def asks_something(draft: Data) -> bool:
+    """Some sweep varies a field: what a person would not want to put together again."""
+    return any(not varies_nothing({"sweeps": [sweep]}) for sweep in draft["sweeps"])
 
 
 def _file(project: Path) -> Path:

@@ -35,6 +35,8 @@ DPI = 160
 """Of a chart, in its file and in the page."""
 SURE = 0.5
 """A knee that fewer resamples have is told as not known."""
+FEW = 5
+"""Repeats, of which there are 126 resamples; of three there are 10, whose shares are of little worth."""
 
 
 def write_page(
@@ -99,25 +101,34 @@ def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:
             f"At {answer.little} of {counted(len(answer.spots), 'point')} less than half of the line is measured: "
             "errors there are of chance finds and wrong peaks, and say little of the scanner."
         )
-    front = answer.front
-    if front is not None and front.knee is not None:
-        spot = answer.spots[front.knee]
-        where = ", ".join(
-            f"{field_label(one, labels)} {shown(value)}"
-            for one, value in zip(answer.sweep.vary, spot.point, strict=True)
-        )
-        chance = front.knee_probability[front.knee]
-        by = f"{where} by {method_name(spot.method)}"
-        said.append(
-            f"More time pays most up to {by}: the knee of the front, in {chance:.0%} of the resamples."
-            if chance >= SURE
-            else f"Where more time stops paying is not known: {by} is the knee of the front in {chance:.0%} of the "
-            "resamples only; more repeats, or values further apart, would tell."
-        )
+    if answer.front is not None and answer.front.knee is not None:
+        said.append(_knee_sentence(answer, labels))
     for reference, ours in answer.beside:
         ((label, theirs, mean, interval, count),) = page_rows_beside([Beside(answer.sweep.name, reference, ours)])
         said.append(f"{label}: {theirs}; here {mean} ({interval}, {count} repeats).")
     return said
+
+
+def _knee_sentence(answer: Answer, labels: dict[str, str]) -> str:
+    front = answer.front
+    assert front is not None and front.knee is not None
+    spot, chance = answer.spots[front.knee], front.knee_probability[front.knee]
+    pairs = zip(answer.sweep.vary, spot.point, strict=True)
+    where = ", ".join(f"{field_label(one, labels)} {shown(value)}" for one, value in pairs)
+    at = f"{method_name(spot.method)}, {where}"
+    repeats = min(one.measure.count for one in answer.spots if one.measure.count)
+    of = f"{chance:.0%} of the resamples of {counted(repeats, 'repeat')}"
+    if chance < SURE:
+        return (
+            f"Where more processor time stops paying is not known: the knee of the front is at {at}, in {of} only; "
+            "more repeats, or values further apart, would tell."
+        )
+    if repeats < FEW:
+        return (
+            f"More processor time seems to pay most up to the knee of the front, at {at}, in {of}: so few repeats have "
+            "hardly any others, and more of them may name another knee."
+        )
+    return f"More processor time pays most up to the knee of the front, at {at}, in {of}."
 
 
 def _limit_words(sweep: Sweep) -> str:
@@ -135,8 +146,13 @@ def _breakdown_sentence(found: Broken, answer: Answer, labels: dict[str, str]) -
         return f"{name}: {limit} holds as far as {parameter} {shown(ended.last_good)}."
     if ended.ending == "fails":
         return f"{name}: {limit} is not kept even at {parameter} {shown(ended.first_bad)}."
+    low, high = sorted((ended.last_good, ended.first_bad))
     interval = f"95 % interval {shown(ended.low)} to {shown(ended.high)}"
-    return f"{name}: {limit} holds up to {parameter} {shown(ended.value)} ({interval}); beyond, {found.cause}."
+    if not found.ended:
+        interval = f"so far between {shown(low)} and {shown(high)}"
+    downwards = ended.first_bad < ended.last_good
+    holds, past = ("needs at least", "below that") if downwards else ("holds up to", "above that")
+    return f"{name}: {limit} {holds} {parameter} {shown(ended.value)} ({interval}); {past}, {found.cause}."
 
 
 def _bound_sentence(found: Bound, answer: Answer, labels: dict[str, str]) -> str:

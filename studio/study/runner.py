@@ -19,8 +19,8 @@ from studio.study.study import SEARCHES, Study
 from studio.study.tables import LOAD, task_seconds
 from studio.study.tasks import Task, tasks
 
-Progress = Callable[[int, int], None]
-"""Cells done, and cells known of so far: a bisection finds out as it goes."""
+Progress = Callable[[int, int, int], None]
+"""Cells done, cells known of so far, and how many searches may ask for beside those."""
 
 
 def run_study(
@@ -30,7 +30,7 @@ def run_study(
     *,
     engine: Engine = EVERY_PROCESSOR,
     shard: Shard = WHOLE,
-    progress: Progress = lambda done, known: None,
+    progress: Progress = lambda done, known, to_come: None,
     cancelled: Cancel = lambda: False,
     begun: Callable[[float], None] = lambda at: None,
 ) -> None:
@@ -60,7 +60,7 @@ def run_study(
 
     first_told = False
     work = tasks(_searches_first(study, missing), study.image_scale, study.laser)
-    progress(done, known)
+    progress(done, known, searching.to_come)
     with team(engine, _measure, begin, cancelled) as workers:
         for _, (seconds, found) in workers.results(work, cancelled, "the study", follow):
             if not first_told:
@@ -69,7 +69,7 @@ def run_study(
             store.add(found)
             measured += [key for key, _, _ in found]
             done += len(found)
-            progress(done, known)
+            progress(done, known, searching.to_come)
 
 
 def _searches_first(study: Study, cells: list[Cell]) -> list[Cell]:

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 from studio.editing.units import Unit
 from studio.project.calibration import Calibration
 from studio.qt.calibrate.calibration_work import BOARD, CalibrationWork
-from studio.qt.calibrate.keeping import FORMS, save, use, use_file
+from studio.qt.calibrate.keeping import ask_and_save, use, use_file
 from studio.qt.calibrate.view_table import ViewTable
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.jobs import JobRunner, time_left
@@ -176,13 +176,7 @@ class CalibratePanel(QWidget):
 
     def ask_and_save(self) -> None:
         """For the calibration file."""
-        if self.work.solved is None:
-            return
-        suggestion = str(Path(self._place()) / "calibration.json")
-        chosen, kind = QFileDialog.getSaveFileName(self, "Save the calibration", suggestion, ";;".join(FORMS))
-        if chosen:
-            path, ending = Path(chosen), kind.rpartition("*")[2].rstrip(")")
-            save(self.work, path if path.suffix else path.with_suffix(ending or ".json"), FORMS.get(kind, ""))
+        ask_and_save(self.work, self)
 
     def ask_and_use(self) -> None:
         """For a calibration file that the project is to be measured with."""

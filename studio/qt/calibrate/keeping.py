@@ -8,8 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from PySide6.QtWidgets import QFileDialog, QWidget
+
 from render.base.errors import InputError
 from studio.qt.calibrate.calibration_work import CalibrationWork
+from studio.qt.core.dialogs import ask_to_keep
 
 FORMS = {
     "Calibration (*.json)": "",
@@ -19,6 +22,34 @@ FORMS = {
     "Camera for mrcal (*.cameramodel)": "mrcal",
 }
 """As a file dialog offers them, and which of `exchange.WRITERS` writes it; "": the calibration file."""
+_NOT_USED = "is neither saved nor used in the project: camera, laser planes and their uncertainty are lost."
+OF_PHOTOGRAPHS = f"What was calibrated from photographs {_NOT_USED}"
+OF_BOARDS = f"What was calibrated from virtual boards {_NOT_USED}"
+
+
+def may_go(work: CalibrationWork, parent: QWidget, *, quits: bool) -> bool:
+    """Whether the open project may be closed; asks where a calibration goes with it. quits: the window closes.
+
+    Photographs and what was found of them stay when another project is opened; virtual boards are of this one.
+    """
+    if work.solved is None or work.solved is work.kept or not (quits or work.virtual):
+        return True
+    what = OF_BOARDS if work.virtual else OF_PHOTOGRAPHS
+    answer = ask_to_keep(parent, "unsaved-calibration", "Save the calibration?", what, "Save…")
+    return answer == "discard" or (answer == "save" and ask_and_save(work, parent))
+
+
+def ask_and_save(work: CalibrationWork, parent: QWidget) -> bool:
+    """Ask where, and save there; False: the calibration is in no file."""
+    if work.solved is None:
+        return False
+    place = work.source if work.shots else str(work.session.place)
+    suggestion = str(Path(place) / "calibration.json")
+    chosen, kind = QFileDialog.getSaveFileName(parent, "Save the calibration", suggestion, ";;".join(FORMS))
+    if chosen:
+        path, ending = Path(chosen), kind.rpartition("*")[2].rstrip(")")
+        save(work, path if path.suffix else path.with_suffix(ending or ".json"), FORMS.get(kind, ""))
+    return work.solved is work.kept
 
 
 def save(work: CalibrationWork, file: Path, form: str = "") -> None:

@@ -43,16 +43,18 @@ def show_trouble(parent: QWidget | None, what: Trouble) -> QMessageBox:
 
 def ask_unsaved(parent: QWidget, name: str, more: str = "") -> Answer:
     """What to do with changes that no file holds; more: what goes whatever is done with them."""
+    what = "\n\n".join(filter(None, ["Without saving they are lost.", more]))
+    return ask_to_keep(parent, "unsaved", f"Save the changes to “{name}”?", what)
+
+
+def ask_to_keep(parent: QWidget, name: str, question: str, what: str, save: str = "Save") -> Answer:
+    """What to do with work that no file holds; what: is lost, in sentences; save: the button that keeps it."""
     button = QMessageBox.StandardButton
-    box = QMessageBox(
-        QMessageBox.Icon.Question,
-        "Unsaved changes",
-        f"Save the changes to “{name}”?",
-        button.Save | button.Discard | button.Cancel,
-        parent,
-    )
-    box.setObjectName("unsaved")
-    box.setInformativeText("\n\n".join(filter(None, ["Without saving they are lost.", more])))
+    buttons = button.Save | button.Discard | button.Cancel
+    box = QMessageBox(QMessageBox.Icon.Question, "Unsaved changes", question, buttons, parent)
+    box.setObjectName(name)
+    box.setInformativeText(what)
+    box.button(button.Save).setText(save)
     box.setDefaultButton(button.Save)
     chosen = box.exec()
     return {button.Save: "save", button.Discard: "discard"}.get(button(chosen), "cancel")  # type: ignore[return-value]

@@ -65,6 +65,6 @@ class RunFoot(QWidget):
         """promised: s that it was estimated to take, which is not to stand uncorrected while nothing is done."""
         self.bar.show_share(job.done)
         left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
-        if job.done == 0.0 and promised is not None and job.seconds > promised:
+        if job.done <= job.there and promised is not None and job.seconds > promised:
             left = f"longer than the {duration(promised)} that were estimated"
         self.stage.setText("stopping" if job.cancel_asked else f"{job.stage}   {left}")

@@ -114,6 +114,8 @@ class FileActions(QObject):
         self.autosave = autosave or Autosave(recovery_folder())
         self.going: Callable[..., Going] = lambda *, quits=False: Going()
         """What goes with the document beside its changes."""
+        self.others_may_go: Callable[..., bool] = lambda *, quits=False: True
+        """Asks about work beside the document that has files of its own."""
         self._pristine: Project | None = session.project
         """As it came from a template or a file: closing it unchanged needs no question; None: it came unsaved."""
         self._rest = QTimer(self, singleShot=True, interval=round(1000 * AFTER_A_CHANGE))
@@ -235,6 +237,9 @@ class FileActions(QObject):
 
         quits: the window with it.
         """
+        return self._document_may_go(quits) and self.others_may_go(quits=quits)
+
+    def _document_may_go(self, quits: bool) -> bool:
         going = self.going(quits=quits)
         if not self.unsaved:
             if going.render:

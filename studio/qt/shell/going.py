@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from PySide6.QtWidgets import QWidget
+
 from analysis.report.units import counted, percent
 from studio.qt.calibrate.calibration_work import CalibrationWork
+from studio.qt.calibrate.keeping import may_go as calibration_may_go
 from studio.qt.core.jobs import RENDER, JobRunner, duration
 from studio.qt.core.session import Session
 from studio.qt.results.export_actions import LANE as EXPORT
 from studio.qt.shell.panels import Panels
+from studio.qt.study.keeping_study import may_go as study_may_go
+from studio.qt.study.study_work import StudyWork
 
 COSTLY = 60.0
 """s of work that a person waited for, and does not want to wait for again for a slip of the hand."""
@@ -25,8 +30,6 @@ class Going:
     """Made by a person in this session and kept nowhere."""
     seconds: float = 0.0
     """That they took."""
-    calibration: str = ""
-    """A sentence about the one that only the window holds, if it closes; empty: there is none."""
 
     @property
     def told(self) -> str:
@@ -34,7 +37,7 @@ class Going:
         many = "" if self.renders == 1 else "s"
         go = "goes" if self.renders == 1 else "go"
         made = f"{self.renders} render{many} of this session {go} as well, whether saved or not. {STAY}"
-        return "\n\n".join(filter(None, [self.render, made if self.renders else "", self.calibration]))
+        return "\n\n".join(filter(None, [self.render, made if self.renders else ""]))
 
     @property
     def costly(self) -> str:
@@ -44,7 +47,7 @@ class Going:
             f"{self.renders} render{'' if one else 's'} of this session, {duration(self.seconds)} of work, "
             f"{'is' if one else 'are'} kept nowhere. {STAY}"
         )
-        return "\n\n".join(filter(None, [made if self.seconds >= COSTLY else "", self.calibration]))
+        return made if self.seconds >= COSTLY else ""
 
 
 def what_goes(session: Session, runner: JobRunner, panels: Panels, *, quits: bool = False) -> Going:
@@ -60,7 +63,15 @@ def what_goes(session: Session, runner: JobRunner, panels: Panels, *, quits: boo
         told = f"{told} {', '.join(exports)} {'is' if len(exports) == 1 else 'are'} still being written.".strip()
     made = [one for one in session.renders if one.is_kept_nowhere]
     seconds = sum(sum(one.frame.seconds.values()) for one in made)
-    return Going(told, len(made), seconds, _calibration(session) if quits else "")
+    return Going(told, len(made), seconds)
+
+
+def others_may_go(session: Session, window: QWidget, *, quits: bool = False) -> bool:
+    """Asks about what is saved in files of its own, once the project is dealt with: the study, and the calibration."""
+    study, calibration = session.findChild(StudyWork), session.findChild(CalibrationWork)
+    if study is not None and not study_may_go(study, window, quits=quits):
+        return False
+    return calibration is None or calibration_may_go(calibration, window, quits=quits)
 
 
 def not_saved(session: Session) -> str:
@@ -72,11 +83,3 @@ def not_saved(session: Session) -> str:
     if work is not None and work.solved is not None and work.solved is not work.kept:
         told += "; the calibration is neither saved nor used in the project: see Calibrate"
     return told
-
-
-def _calibration(session: Session) -> str:
-    """Of photographs, which stay when another project is opened; virtual boards are made again in seconds."""
-    work = session.findChild(CalibrationWork)
-    if work is None or work.virtual or work.solved is None or work.solved is work.kept:
-        return ""
-    return "What was calibrated from photographs is neither saved nor used in a project, and goes as well."

@@ -36,7 +36,7 @@ from studio.qt.shell.command_keys import CommandKeys
 from studio.qt.shell.command_search import CommandSearch
 from studio.qt.shell.escape import escape
 from studio.qt.shell.file_actions import FileActions
-from studio.qt.shell.going import what_goes
+from studio.qt.shell.going import others_may_go, what_goes
 from studio.qt.shell.help import Help, panel_with_focus
 from studio.qt.shell.motion_calls import MotionCalls
 from studio.qt.shell.panels import PANELS, Making, Panels
@@ -103,6 +103,7 @@ class MainWindow(QMainWindow):
         self.setStatusBar(self.status)
         self.files = FileActions(self, session, self.preferences, autosave)
         self.files.going = partial(what_goes, session, self.runner, self.panels)
+        self.files.others_may_go = partial(others_may_go, session, self)
         self.exports = ExportActions(self, session, self.runner, self.preferences, self.commands)
         self.panels.when_made("results", self.exports.follow)
         self.measuring = MeasureActions(self, session, self.commands)

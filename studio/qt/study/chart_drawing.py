@@ -32,7 +32,7 @@ class Drawing:
 def draw(answer: Answer, labels: dict[str, str], size: tuple[int, int], ratio: float, colours: Colours) -> Drawing:
     """size: width and height of the widget, px."""
     width, height = (max(LEAST, side) for side in size)
-    made = chart(answer, labels)
+    made = chart(answer, labels, (width / DPI, height / DPI))
     _recolour(made, colours)
     made.set_size_inches(width / DPI, height / DPI)
     made.set_dpi(DPI * ratio)

@@ -42,7 +42,7 @@ class ChartsPanel(QWidget):
         self.runner = runner
         self.work = one_of(StudyWork, session)
         self.opener = one_of(CellOpener, session)
-        self.tabs = QTabBar(expanding=False, usesScrollButtons=True, elideMode=Qt.TextElideMode.ElideRight)
+        self.tabs = QTabBar(expanding=False, usesScrollButtons=True, elideMode=Qt.TextElideMode.ElideNone)
         self.tabs.setDrawBase(False)
         self.question, self.findings = QLabel(wordWrap=True), QLabel(wordWrap=True)
         self.question.setObjectName("muted")

@@ -33,28 +33,40 @@ KINDS = [
     ("Range", "linear", "From, to, and how many at equal steps"),
     ("Log range", "logarithmic", "From, to, and how many at equal factors"),
 ]
+UNTIL_MENDED = "Until it is mended the study has the values from before."
 UNKNOWN = FieldSpec("", "", "", "number", 0.0)
 """Of a field that the base project does not have."""
 
 
 class ValuesField(TextField):
-    """A list of numbers in the shown unit, separated by spaces or commas."""
+    """A list of numbers in the shown unit, separated by spaces or commas; one that will not do stays to be mended."""
 
     def text_of(self, value: Any) -> str:
         return "  ".join(self.spec.unit.format(one) for one in value)
 
     def read(self, text: str) -> list[float]:
-        values = [self.spec.unit.parse(part) for part in text.replace(",", " ").split()]
-        if not values:
+        parts = text.replace(",", " ").split()
+        if not parts:
             raise InputError("a value is missing")
-        problem = self.spec.problem(tuple(values))
-        if problem is not None:
-            raise InputError(problem)
-        if self.spec.kind == "integer":
-            if any(value != int(value) for value in values):
-                raise InputError("must be whole numbers")
-            return [int(value) for value in values]
-        return values
+        return [self._read_one(part) for part in parts]
+
+    def _read_one(self, part: str) -> float:
+        """InputError: which entry will not do, and why."""
+        try:
+            value = self.spec.unit.parse(part)
+        except InputError as error:
+            raise InputError(f"“{part}”: {error.what}", allowed=error.allowed) from None
+        whole = self.spec.kind == "integer"
+        problem = "must be a whole number" if whole and value != int(value) else self.spec.problem(value)
+        if problem:
+            raise InputError(f"“{part}” {problem}")
+        return int(value) if whole else value
+
+    def leave(self) -> None:
+        """A list is long to type again: unlike a single value it is not dropped for one bad entry."""
+        self.enter()
+        if self.pending:
+            self.given_up.emit()
 
 
 class ChoicesButton(QPushButton):
@@ -169,7 +181,7 @@ class ParameterRow(QWidget):
             self.values.setToolTip(f"Values in {spec.unit.shown}" if spec.unit.shown else "Values")
             self.values.entered.connect(lambda values: self._change(values=values))
             self.values.refused.connect(self._tell)
-            self.values.given_up.connect(self._tell_given_up)
+            self.values.given_up.connect(lambda: self._tell(f"{self.reason.text()}. {UNTIL_MENDED}"))
             line.addWidget(self.values, 1)
             unit = QLabel(spec.unit.shown)
             unit.setObjectName("muted")

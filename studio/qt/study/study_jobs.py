@@ -61,11 +61,12 @@ def running(
     engine: Engine,
     grew: Callable[[Found], None],
     started: Callable[[float], None],
+    there: Callable[[float], None],
 ) -> Callable[[Progress, Cancel], Ended]:
     """run: `run_into`, which hears of the rest."""
 
     def work(progress: Progress, cancelled: Cancel) -> Ended:
-        told = {"progress": progress, "cancelled": cancelled, "grew": grew, "started": started}
+        told = {"progress": progress, "cancelled": cancelled, "grew": grew, "started": started, "there": there}
         try:
             return Ended(run(folder, study, bases, engine=engine, **told))
         except InputError as error:

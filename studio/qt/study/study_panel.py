@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -19,9 +20,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from render.base.errors import InputError
 from studio.qt.core.boxes import ChoiceBox, DecimalBox, WholeBox
-from studio.qt.core.dialogs import ask_to_save_first, choose_file
+from studio.qt.core.dialogs import choose_file
 from studio.qt.core.folders import ask_results_folder
 from studio.qt.core.icons import icon_button
 from studio.qt.core.jobs import JobRunner, duration
@@ -29,21 +29,16 @@ from studio.qt.core.run_foot import RunFoot
 from studio.qt.core.session import Session, one_of
 from studio.qt.core.tab_order import tab_as_laid_out
 from studio.qt.core.widgets import Scrolled, align_labels, flush, text_button
+from studio.qt.study.keeping_study import FILES, ask_and_save, may_be_replaced
 from studio.qt.study.study_work import StudyWork
 from studio.qt.study.sweep_editor import SweepEditor
 from studio.runtime.jobs import Job
-from studio.study.draft import by_names, new_sweep, varies_nothing
+from studio.study.draft import new_sweep, varies_nothing
 from studio.study.estimate import Estimate
-from studio.study.folder_run import in_window
 from studio.study.study import Study, ready_made
-from studio.study.study_file import check_base, waits_for_project
 
+NOT_OPEN = "its own, not the open project"
 EMPTY = "What it takes is told here as soon as every sweep varies a field."
-NAMES_PROJECT = (
-    "A study's file names that of its project, and this project is in no file as it is now. Save the study beside it "
-    "then, or in a folder above."
-)
-FILES = "Studies (*.json);;All files (*)"
 
 
 class StudyPanel(QWidget):
@@ -62,6 +57,8 @@ class StudyPanel(QWidget):
         self.files.setMenu(menu)
         self.base = ChoiceBox()
         self.base.setToolTip("The project that every cell is a variation of")
+        self.not_open = QLabel(NOT_OPEN)
+        self.not_open.setObjectName("muted")
         self.laser = ChoiceBox()
         self.laser.setToolTip("The laser whose line every cell measures")
         self.sweeps = ChoiceBox()
@@ -113,6 +110,7 @@ class StudyPanel(QWidget):
         if draft["base"] in work.loaded:
             self.base.addItem(f"{draft['base'].replace('_', ' ')}, as in the study")
             self.base.setCurrentIndex(1)
+        self.not_open.setVisible(draft["base"] in work.loaded)
         self._show_lasers()
         self.sweeps.clear()
         self.sweeps.addItems([sweep["name"] for sweep in draft["sweeps"]])
@@ -151,51 +149,33 @@ class StudyPanel(QWidget):
 
     def _fill_files(self, menu: QMenu) -> None:
         menu.clear()
-        menu.addAction("New study", self.work.start_anew)
+        menu.addAction("New study", partial(self._replace, self.work.start_anew))
         ready = menu.addMenu("Ready-made")
         for name in ready_made():
-            ready.addAction(name.replace("_", " ").capitalize(), partial(self.work.load, name))
+            ready.addAction(name.replace("_", " ").capitalize(), partial(self._replace, self.work.load, name))
         menu.addAction("Open a study's file…", self._open)
         menu.addAction("Open results…", self._open_results)
         menu.addSeparator()
         menu.addAction("Save the study…", self._save)
 
+    def _replace(self, come: Callable[..., None], *which: Path | str) -> None:
+        """Another study in place of this one, unless a person stays with this one."""
+        if may_be_replaced(self.work, self):
+            come(*which)
+
     def _open(self) -> None:
         chosen = choose_file(self.session, self, "Open a study", FILES)
         if chosen is not None:
-            self.work.load(chosen)
+            self._replace(self.work.load, chosen)
 
     def _open_results(self) -> None:
         chosen = QFileDialog.getExistingDirectory(self, "Folder of a study's results", str(self.session.place))
         if chosen:
             self.session.chose(Path(chosen))
-            self.work.open_folder(Path(chosen))
+            self._replace(self.work.open_folder, Path(chosen))
 
     def _save(self) -> None:
-        if not self._may_be_saved():
-            return
-        suggestion = str(self.session.place / f"{self.work.draft['name']}.json")
-        chosen, _ = QFileDialog.getSaveFileName(self, "Save the study", suggestion, FILES)
-        if chosen:
-            self.session.chose(Path(chosen))
-            self.work.save(Path(chosen))
-
-    def _may_be_saved(self) -> bool:
-        """Before a person is asked where: there is a study, and a file of the project that it can name."""
-        work, session = self.work, self.session
-        try:
-            base = work.study().base
-            if waits_for_project(base, session.document, work.loaded):
-                if not ask_to_save_first(self.window(), session.project.name, NAMES_PROJECT):
-                    return False
-                session.save_asked.emit()
-                if waits_for_project(base, session.document, work.loaded):
-                    return False  # nobody said where
-            check_base(base, session.document, work.loaded)
-        except InputError as error:
-            session.message.emit("warning", f"The study cannot be saved: {by_names(in_window(error), work.draft)}")
-            return False
-        return True
+        ask_and_save(self.work, self)
 
     def _add_sweep(self) -> None:
         work = self.work
@@ -293,6 +273,7 @@ class StudyPanel(QWidget):
         of.addWidget(self.base, 1)
         of.addWidget(self.laser)
         form.addRow("Of", of)
+        form.addRow("", self.not_open)
         form.addRow("Sweep", sweeps)
         runs = QHBoxLayout()
         runs.addWidget(self.repeats)

@@ -30,7 +30,7 @@ from studio.study.folder_run import Found, in_window, run_into
 from studio.study.kept_draft import keep_draft, kept_draft, kept_folder
 from studio.study.store import FILE
 from studio.study.study import Study, require_laser
-from studio.study.study_file import base_name, write_study
+from studio.study.study_file import base_name
 
 OF_ANOTHER = "The folder holds a study of another set-up. {}. Choose another folder, or undo the change."
 NOT_AS_IT_IS = "it does not go on as it is set up now, which the Study workspace explains; what was measured is kept"
@@ -61,6 +61,8 @@ class StudyWork(LongWork):
         """Someone looks at the estimate."""
         self.draft, self.loaded = self._begun()
         """loaded: base projects of a study that came from a file; empty: it is of the open project."""
+        self.as_it_came = new_draft(self.base_name)
+        """The draft before a person changed it, or as it was saved last."""
         self._first_scale = FirstScale(self)
         self.folder = self._kept_folder()
         self._document, self._changed = session.document, False
@@ -89,6 +91,11 @@ class StudyWork(LongWork):
     def base_name(self) -> str:
         """What a study's file calls the open project: a template by its name, else the project's file."""
         return base_name(self.session.document)
+
+    @property
+    def kept_with_project(self) -> bool:
+        """It is there again when the project is opened again, unless another study takes its place."""
+        return self._document.path is not None
 
     @property
     def sweep(self) -> Data:
@@ -184,7 +191,7 @@ class StudyWork(LongWork):
             study, root = Study.load(path)
             bases = study.bases(root)
         except InputError as error:
-            self._fail(in_window(error))
+            self.tell_failure(in_window(error))
             return
         self._take(bases, study.model_dump(mode="json", exclude_defaults=True))
 
@@ -194,17 +201,6 @@ class StudyWork(LongWork):
         self.loaded.pop(self.base_name, None)
         self._document = self.session.document
         self.change(lambda draft: draft.update(base=self.base_name))
-
-    def save(self, file: Path) -> bool:
-        """Write the study's file; False: told in `failure`, nothing is written."""
-        try:
-            write_study(file, self.study(), self.session.document, self.loaded)
-        except InputError as error:
-            self._fail(self._said(error))
-            return False
-        self._fail("")
-        self.session.message.emit("info", f"Saved the study: {file}")
-        return True
 
     # what it takes
 
@@ -260,11 +256,11 @@ class StudyWork(LongWork):
             study = self.study()
             bases = self.bases(study)
         except InputError as error:
-            self._fail(self._said(error))
+            self.tell_failure(self._said(error))
             return
         grew = partial(self._grew.emit, self.folder)
-        work = running(run_into, self.folder, study, bases, self.engine, grew, self._take_start)
-        self._fail("")
+        work = running(run_into, self.folder, study, bases, self.engine, grew, self._take_start, self._take_there)
+        self.tell_failure("")
         self._run_bases = bases
         self.promised = self.estimate.wall(self.processors) if self.estimate is not None else None
         self._begin(work, self._take_end)
@@ -299,7 +295,7 @@ class StudyWork(LongWork):
             return
 
         def then(ended: Ended) -> None:
-            self._fail(ended.problem)
+            self.tell_failure(ended.problem)
             if ended.found is None:
                 return
             if as_it_is:
@@ -321,7 +317,7 @@ class StudyWork(LongWork):
         self._document, self._changed = self.session.document, False
         self.loaded, self.chosen = bases, 0
         self.folder, self.found, self.estimate, self._timed, self.failure = None, None, None, {}, ""
-        self.draft = {"schema_version": 1, "name": "study", **draft}
+        self.draft = self.as_it_came = {"schema_version": 1, "name": "study", **draft}
         self._first_scale.begin()
         self.draft_changed.emit()
         self.found_changed.emit()
@@ -333,6 +329,10 @@ class StudyWork(LongWork):
         if self.job is not None:
             self.job.start_up = seconds
 
+    def _take_there(self, share: float) -> None:
+        if self.job is not None:
+            self.job.there = share
+
     def _take_growth(self, folder: Path, found: Found) -> None:
         if folder == self.folder:
             self.found = found
@@ -341,7 +341,7 @@ class StudyWork(LongWork):
     def _take_end(self, ended: Ended) -> None:
         if ended.found is not None:
             self.session.message.emit("info", f"The study is done: {self.folder}")
-        self._fail(ended.problem)
+        self.tell_failure(ended.problem)
 
     def _after_run(self) -> None:
         self.look_ahead()
@@ -354,7 +354,8 @@ class StudyWork(LongWork):
     def _said(self, error: InputError) -> str:
         return by_names(in_window(error), self.draft)
 
-    def _fail(self, failure: str) -> None:
+    def tell_failure(self, failure: str) -> None:
+        """What could not be done; empty: nothing."""
         self.failure = failure
         self.estimated.emit()
 
@@ -378,7 +379,7 @@ class StudyWork(LongWork):
         else:
             draft, bases = self._begun()
             self._take(bases, draft)
-            self.folder = self._kept_folder()
+            self.as_it_came, self.folder = new_draft(self.base_name), self._kept_folder()
             self.state_changed.emit()
             if self.watched:
                 self.look()

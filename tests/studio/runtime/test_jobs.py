@@ -161,6 +161,26 @@ def test_time_left_follows_the_progress_and_never_grows_between_two_reports(monk
     assert job.seconds_left is None
 
 
+def test_what_an_earlier_run_had_done_is_no_part_of_the_pace(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    monkeypatch.setattr(jobs, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    told, end = threading.Event(), threading.Event()
+
+    def work(progress: Progress, cancelled: Cancel) -> None:
+        progress("60 of 100 cells", 0.6)
+        clock[0] = 30.0
+        progress("70 of 100 cells", 0.7)
+        told.set()
+        end.wait(180)
+
+    job = Job("study", work)
+    job.there, job.start_up = 0.6, 10.0
+    job.start()
+    assert told.wait(180) and job.seconds_left == pytest.approx(60.0)
+    end.set()
+    job.join()
+
+
 def test_a_long_start_is_not_taken_for_the_pace_of_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     """Workers of a study that start for a minute made 18 cells of ten seconds a matter of twenty minutes."""
     clock = [0.0]

@@ -284,7 +284,7 @@ def test_a_killed_study_goes_on_with_nothing_lost_or_done_twice(whole: tuple[Pat
 
 def test_show_tells_what_a_folder_holds(whole: tuple[Path, bytes]) -> None:
     done = CliRunner().invoke(main.cli, ["study", "show", str(whole[0])])
-    assert done.exit_code == 0 and "beyond, starved" in " ".join(done.stdout.split())
+    assert done.exit_code == 0 and "below that, starved" in " ".join(done.stdout.split())
 
 
 def test_a_folder_without_a_study_is_told(tmp_path: Path) -> None:

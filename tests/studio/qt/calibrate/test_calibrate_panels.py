@@ -15,12 +15,11 @@ from studio.calibration.board_text import FORM
 from studio.calibration.exchange import read_camera
 from studio.qt.calibrate.board_view import COVERAGE, DEPTH, NEXT, RESIDUALS, TABS
 from studio.qt.calibrate.calibrate_panel import NARROWEST
-from studio.qt.calibrate.keeping import FORMS, save, use, use_file
+from studio.qt.calibrate.keeping import FORMS, may_go, save, use, use_file
 from studio.qt.core import theme
-from studio.qt.shell.going import what_goes
 from tests.analysis.calibration.boards import SIZE
 from tests.studio.qt.calibrate.calibrate_desk import LINE, VIEWS, Desk, seen, settled
-from tests.studio.qt.shell.window_hands import contrast
+from tests.studio.qt.shell.window_hands import answer, choose_file, contrast
 
 
 class TestViews:
@@ -149,22 +148,42 @@ class TestPictures:
         work._take_solved(work.solved)
         assert "The lens has" not in solved.found.text.toPlainText()
 
-    def test_what_only_the_window_holds_is_told_before_it_closes(self, solved: Desk, tmp_path: Path) -> None:
+    def test_what_only_the_window_holds_is_asked_about_before_it_closes(
+        self, solved: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """One of virtual boards, finished and not used yet, went with Ctrl+Q."""
         work = solved.work
+        told: list[str] = []
 
-        def going(quits: bool = True) -> str:
-            return what_goes(work.session, solved.runner, {}, quits=quits).costly  # type: ignore[arg-type]
+        def asked(parent: object, name: str, question: str, what: str, save: str) -> str:
+            told.append(what)
+            return "cancel"
 
+        monkeypatch.setattr("studio.qt.calibrate.keeping.ask_to_keep", asked)
+        assert not may_go(work, solved.panel, quits=True) and "from virtual boards is neither saved" in told[-1]
+        assert not may_go(work, solved.panel, quits=False), "boards are of the project that is closed"
         work.virtual = False  # as if they were of photographs
-        assert "calibrated from photographs is neither saved nor used" in going()
-        assert going(quits=False) == "", "photographs stay when another project is opened"
+        assert not may_go(work, solved.panel, quits=True) and "calibrated from photographs" in told[-1]
+        assert may_go(work, solved.panel, quits=False), "photographs stay when another project is opened"
         work.virtual = True
-        assert going() == ""
-        work.virtual = False
         save(work, tmp_path / "camera.yaml", "opencv")
-        assert going() != "", "a camera's file has no laser"
+        assert not may_go(work, solved.panel, quits=True), "a camera's file has no laser"
         save(work, tmp_path / "calibration.json")
-        assert going() == ""
+        assert may_go(work, solved.panel, quits=True)
+
+    def test_a_calibration_is_saved_thrown_away_or_stayed_with_as_the_window_closes(
+        self, solved: Desk, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        answer(qtbot, "unsaved-calibration", "Cancel")
+        assert not may_go(solved.work, solved.panel, quits=True)
+        answer(qtbot, "unsaved-calibration", "Discard")
+        assert may_go(solved.work, solved.panel, quits=True)
+        choose_file(monkeypatch, "")
+        answer(qtbot, "unsaved-calibration", "Save…")
+        assert not may_go(solved.work, solved.panel, quits=True), "nobody said where"
+        choose_file(monkeypatch, tmp_path / "mine.json")
+        answer(qtbot, "unsaved-calibration", "Save…")
+        assert may_go(solved.work, solved.panel, quits=True) and (tmp_path / "mine.json").exists()
 
     def test_tabs_without_room_scroll_and_keep_their_words(self, solved: Desk) -> None:
         tabs = solved.boards.tabs

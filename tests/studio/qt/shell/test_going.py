@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QMessageBox
 from pytestqt.qtbot import QtBot
 
 from studio.qt.results.export_actions import LANE as EXPORT
+from studio.qt.shell.file_actions import template
 from studio.qt.shell.window import MainWindow
 from tests.studio.qt.shell.window_hands import answer, until_cancelled
 
@@ -24,3 +25,16 @@ def test_an_export_that_is_being_written_is_asked_about_before_the_window_goes(
     assert told == ["rep.pdf is still being written."]
     window.runner.cancel(EXPORT)
     qtbot.waitUntil(lambda: not window.runner.busy)
+
+
+def test_a_changed_study_of_a_project_without_a_file_is_asked_about_before_the_window_goes(
+    window: MainWindow, qtbot: QtBot
+) -> None:
+    window.files.replace(template("plane", window.files.autosave))
+    work = window.panels["study"].work  # type: ignore[attr-defined]
+    work.load("quick")
+    assert window.files.may_close(quits=True), "a ready-made one is not lost"
+    work.change(lambda draft: draft.update(repeats=7))
+    answer(qtbot, "unsaved-study", "Cancel")
+    assert not window.close() and window.isVisible()
+    work.load("quick")

@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from studio.editing.scene_edits import LASERS
 from studio.qt.render.develop_panel import DevelopPanel
+from studio.qt.study.keeping_study import save
 from studio.scan.folder_lock import hold
 from studio.study.draft import VALUES
 from studio.study.store import FILE
@@ -174,19 +175,22 @@ class TestDraft:
         assert desk.panel.sweeps.count() == 6 and desk.work.project().name != ""
         qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.cells > 600)
         assert set(desk.work.loaded) == {"dark_plate", "shiny_weld_seam"}
+        told = desk.panel.not_open
+        assert told.isVisible() and "not the open project" in told.text(), "“Of” changed without a word"
         desk.work.use_open_project()
+        assert told.isHidden()
         assert desk.work.draft["base"] == "plane.json" and desk.work.project() is desk.session.project
 
     def test_a_ready_made_study_is_saved_elsewhere_with_changes_of_ones_own(self, desk: Desk, tmp_path: Path) -> None:
         desk.work.load("quick")
         desk.work.change(lambda draft: draft.update(repeats=3))
-        assert desk.work.save(tmp_path / "mine.json"), desk.work.problem
+        assert save(desk.work, tmp_path / "mine.json"), desk.work.problem
         mine, root = Study.load(tmp_path / "mine.json")
         assert mine.repeats == 3 and mine.bases(root) == desk.work.loaded
 
     def test_a_saved_study_asks_the_same(self, qtbot: QtBot, desk: Desk, tmp_path: Path) -> None:
         desk.small([2.0, 20.0])
-        assert desk.work.save(tmp_path / "noise.json")
+        assert save(desk.work, tmp_path / "noise.json")
         before = desk.work.study()
         desk.work.start_anew()
         desk.work.load(tmp_path / "noise.json")
@@ -208,7 +212,7 @@ class TestDraft:
             return saves
 
         monkeypatch.setattr("studio.qt.study.study_panel.QFileDialog.getSaveFileName", where)
-        monkeypatch.setattr("studio.qt.study.study_panel.ask_to_save_first", first)
+        monkeypatch.setattr("studio.qt.study.keeping_study.ask_to_save_first", first)
         document = desk.session.document
         desk.session.save_asked.connect(lambda: document.save(tmp_path / "plane.json"))
         desk.small([2.0, 20.0])
