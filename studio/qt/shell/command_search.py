@@ -39,6 +39,7 @@ WORDS = {
     "expose": "brightness dark bright saturated",
     "scan": "conveyor turntable speed all frames",
     "photographs": "real camera phone rectangle region",
+    "export_photographs": "export save photograph points table picture",
     "deviation": "compare CAD tolerance surface",
     "heights": "depth range image topography",
     "shortcuts": "keys keyboard",

@@ -147,3 +147,11 @@ def test_a_measure_is_added_from_the_search_once_there_is_a_profile(window: Main
     part = window.panels["results"].part  # type: ignore[attr-defined]
     qtbot.waitUntil(lambda: part.placing == "thickness")
     part.cancel()
+
+
+@pytest.mark.parametrize(("typed", "text"), [("export photograph points", "File > Export > Line in photographs")])
+def test_an_export_is_found_by_what_is_exported(window: MainWindow, qtbot: QtBot, typed: str, text: str) -> None:
+    search = CommandSearch(window)
+    qtbot.addWidget(search)
+    search.show_found(typed)
+    assert search.list.item(0).text().startswith(text)
