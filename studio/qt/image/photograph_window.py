@@ -49,6 +49,7 @@ EMPTY = "Drop photographs of the line here, several of one set, or add them."
 FILTER = "Images ({});;All files (*)"
 CHOICES = {"colour": ("auto", "mono", "red", "green", "blue"), "axis": ("auto", "rows", "columns")}
 AUTO = "auto"
+NOT_YET = "Press Measure to find the line in {}."
 OLD = "Settings have changed: these figures are of those before. Measure again for new ones."
 NO_RENDER = "Nothing is rendered yet: Render (F5), and the image appears here"
 NOT_CHOSEN = "No render is chosen: choose one in the list of the Render workspace"
@@ -295,6 +296,9 @@ class PhotographWindow(QWidget):
             self.told.setText(EMPTY)
             for label in (self.chosen, self.problem, self.written):
                 label.clear()
+        elif self.found is None:
+            count = len(self.paths)
+            self.told.setText(NOT_YET.format("this photograph" if count == 1 else f"these {count} photographs"))
         self._show_age()
 
     def _shown(self) -> Path | None:
@@ -328,7 +332,7 @@ class PhotographWindow(QWidget):
 
     def _failed(self, job: Job[object]) -> None:
         self.bar.setVisible(False)
-        self.problem.setText(str(job.problem))
+        self.problem.setText(job.problem.text if job.problem is not None else "")
 
     def _show_line(self) -> None:
         self.export.refresh()
