@@ -36,7 +36,7 @@ from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
-from studio.qt.core.widgets import ShareBar, text_button
+from studio.qt.core.widgets import ShareBar, breakable, text_button
 from studio.qt.image.image_item import PictureView
 from studio.qt.image.photograph_export import PhotographExport
 from studio.qt.image.photograph_rectangle import PhotographRectangle
@@ -261,7 +261,7 @@ class PhotographWindow(QWidget):
         self.clear_button.clicked.connect(self.clear)
         self.off_button.clicked.connect(self._ask_off)
         self.measure_button.clicked.connect(self.measure)
-        self.export.told.connect(self.written.setText)
+        self.export.told.connect(lambda text: self.written.setText(breakable(text)))
         for signal in (self.colour.currentIndexChanged, self.axis.currentIndexChanged, self.rectangle.changed):
             signal.connect(lambda *_: self._show_age())
         self.bright.toggled.connect(lambda on: self._show_rendered())
