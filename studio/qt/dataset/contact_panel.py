@@ -17,6 +17,7 @@ from studio.qt.dataset.large_picture import LargePicture
 GAP = 6
 LINE = QColor("#e69f00")
 LINE_WIDTH = 1.5
+SIMPLER = "So small, gloss and curves are rougher than in the images: a double click shows one as it will be."
 
 
 class ContactPanel(QWidget):
@@ -84,7 +85,7 @@ class ContactPanel(QWidget):
         which = f"the first {of_all} scenes of the recipe" if of_all < work.scenes else f"the {of_all} scenes"
         drawn = f"Preview: {which}" + (f", {made} of them so far" if made < of_all else "")
         again = f"; {anew} were drawn anew, as they showed no line" if anew else ""
-        return f"{drawn}{again}. The exact line is drawn on the upper half."
+        return f"{drawn}{again}. The exact line is drawn on the upper half. {SIMPLER}"
 
 
 class Sheet(QWidget):

@@ -130,6 +130,7 @@ def test_the_sheet_is_said_to_be_a_preview(desk: Desk, qtbot: QtBot) -> None:
     """With two scenes to be made it said "24 of 24 scenes"."""
     qtbot.waitUntil(lambda: desk.ready)
     assert desk.sheet.told.text().startswith("Preview: the first 3 scenes of the recipe")
+    assert "gloss and curves are rougher than in the images" in desk.sheet.told.text()
     there = dict(desk.work.pictures)
     desk.panel.scenes.setValue(2)  # fewer draw nothing anew, and no scene is shown that will not be there
     assert desk.sheet.told.text().startswith("Preview: the 2 scenes.") and not desk.work.drawing
