@@ -76,6 +76,12 @@ def pictures(recipe: Recipe, root: Path, scenes: int, cancelled: Cancel = never)
             threads.shutdown(cancel_futures=True)
 
 
+def large_picture(recipe: Recipe, root: Path, number: int, cancelled: Cancel = never) -> Picture:
+    """One of the scenes in the size of the recipe's images. Errors: as `pictures`."""
+    scene = drawn_scene(recipe.model_copy(update={"images": 1}), base_of(recipe, root), root, number, Preview())
+    return _picture(scene, cancelled)
+
+
 def _picture(scene: Scene, cancelled: Cancel) -> Picture:
     frame = rendered(scene, cancelled)
     pixels = photograph(scene.projects[0], frame, None).astype(np.float64)

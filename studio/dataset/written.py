@@ -26,17 +26,18 @@ def written_pictures(folder: Path, images: Sequence[int], cancelled: Cancel = ne
         if cancelled():
             return
         try:
-            yield _written(folder, image)
+            yield written_picture(folder, image)
         except (InputError, KeyError, TypeError, ValueError, cv2.error):
             continue  # who goes on with the folder, or reads it, is told
 
 
-def _written(folder: Path, image: int) -> Picture:
+def written_picture(folder: Path, image: int, side: int | None = SIDE) -> Picture:
+    """One of them. side: px of the longer side at most; None: as it is. InputError: it cannot be read."""
     record = label_record(folder, image)
     data = read_bytes(folder / IMAGES / f"{name_of(image)}.png", MOST_BYTES, "image")
     pixels = np.asarray(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED))
     height, width = pixels.shape[:2]
-    scale = min(1.0, SIDE / max(height, width))
+    scale = 1.0 if side is None else min(1.0, side / max(height, width))
     size = max(1, round(width * scale)), max(1, round(height * scale))
     small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA).astype(np.float64)
     if small.ndim == 3:

@@ -107,17 +107,29 @@ def stands(item: SceneObject, vertices: Float) -> bool:
     return abs(float((vertices @ matrix[2, :3]).min() + matrix[2, 3])) < STANDS
 
 
-def fitted(item: SceneObject, vertices: Float, scene: Scene) -> SceneObject:
-    """Scaled to FILLED of the camera's view, its middle in the middle of it; what stands on the ground stays there.
+def rests(item: SceneObject, vertices: Float, others: Sequence[Float]) -> bool:
+    """As `on_top` would put it on one of the others; both as of that."""
+    own = transform_points(item.T_world_object.matrix, vertices)
+    low, high = own.min(axis=0), own.max(axis=0)
+    return any(abs(highest_within(one, low[:2], high[:2]) - low[2]) < STANDS for one in others)
 
-    vertices: as of `with_axis_up`.
+
+def fitted(item: SceneObject, vertices: Float, scene: Scene, others: Sequence[Float] = ()) -> SceneObject:
+    """Scaled to FILLED of the camera's view, its middle in the middle of it; what stands on the ground stays there,
+    and what rests on others stays on them, about the middle of its foot.
+
+    vertices: as of `with_axis_up`; others: as of `on_top`.
     """
     matrix = item.T_world_object.matrix
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     scale = float(f"{item.scale * FILLED * field_of_view(scene) / float((high - low).max()):.3g}")
-    middle = matrix[:3, :3] @ (low + high) / 2.0 * (scale / item.scale)
-    made = _moved(item.model_copy(update={"scale": scale}), target(scene) - middle)
-    return on_ground(made, vertices * (scale / item.scale)) if stands(item, vertices) else made
+    factor = scale / item.scale
+    scaled = item.model_copy(update={"scale": scale})
+    if not stands(item, vertices) and rests(item, vertices, others):
+        # a wider part may reach a higher place of what leans below it
+        return on_top(on_its_foot(scaled, vertices, factor), vertices * factor, others)
+    made = _moved(scaled, target(scene) - matrix[:3, :3] @ (low + high) / 2.0 * factor)
+    return on_ground(made, vertices * factor) if stands(item, vertices) else made
 
 
 def on_its_foot(item: SceneObject, vertices: Float, factor: float) -> SceneObject:

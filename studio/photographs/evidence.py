@@ -150,69 +150,6 @@ class Evidence:
         """Two where the first line's only rival is a second one, which is as clear of everything else."""
         return 2 if self.second > max(self.score, SECOND) else 1
 
-    @property
-    def warnings(self) -> list[str]:
-        """Doubts for a person."""
-        found = []
-        if max(self.clearest.values()) < FAINT:
-            found.append(
-                "no line stands out in the photographs, in any colour or direction: see the overlay, and give "
-                "--axis and --laser"
-            )
-        else:
-            for axis, other in self.clearest.items():
-                if axis != self.axis and other > WEAK * self.clearest[self.axis]:
-                    found.append(
-                        f"the line may run along the {self.axis} instead (evidence {other:.2f} for --axis {axis}, "
-                        f"{self.clearest[self.axis]:.2f} for {self.axis})"
-                    )
-            if max(self.score, self.second) < DOUBTFUL:
-                found.append(
-                    f"what is taken for the line stands out weakly (evidence {self.score:.2f}): it may be an edge, or "
-                    "a reflection: see the overlay"
-                )
-        return found
-
-    def _why(self, by_name: dict[str, float]) -> str:
-        """Why it is not the first of them."""
-        clearer = by_name[self.combination.name] < max(by_name.values())
-        return f"; {self.combination.name} is as clear as that, with less noise" if clearer else ""
-
-    @property
-    def _searched(self) -> str:
-        name = self.combination.name
-        return f"{name}, all channels together" if name == "mono" and len(self.scores[self.axis]) > 1 else name
-
-    def _coloured(self) -> str:
-        """Its colour, and by what light."""
-        if self.light is None:
-            return self.colour
-        of_light = ", ".join(f"{colour} {share:.0%}" for colour, share in self.light.items())
-        grey = ": none has much more than the others" if self.colour == "mono" else ""
-        return f"{self.colour} (of the line's light {of_light}{grey})"
-
-    def told(self) -> list[tuple[str, str]]:
-        """(what, choice and reason) for a person."""
-        axis = self.axis
-        axis_reason = ", ".join(f"{name} {score:.2f}" for name, score in self.clearest.items())
-        by_name = self.scores[self.axis]
-        ranked = sorted(by_name.items(), key=lambda item: -item[1])[:4]
-        reason = ", ".join(f"{name} {score:.2f}" for name, score in ranked) if len(by_name) > 1 else "given"
-        found = [
-            ("scan axis", f"{axis} ({axis_reason})"),
-            ("laser's colour", self._coloured()),
-            ("looked for in", f"{self._searched} ({reason}{self._why(by_name)})"),
-        ]
-        if self.lines == 2:
-            found.append(("lines", f"a second line stands out (evidence {self.score:.2f} and {self.second:.2f})"))
-        elif self.second > WEAK * self.score:
-            found.append(
-                ("lines", f"a second line stands out weakly (evidence {self.second:.2f}): --peaks 2 takes both")
-            )
-        else:
-            found.append(("lines", f"one (evidence {self.score:.2f}; of a second {self.second:.2f})"))
-        return found
-
 
 def find_evidence(
     shrunk: Sequence[Shrunk],

@@ -10,9 +10,12 @@ import numpy as np
 
 from analysis.line.extract import settings_of
 from render.base.errors import InputError
+from studio.photographs.evidence_words import CONTROLS
 from studio.photographs.photograph_set import Look, Wishes, look_at
 from studio.photographs.photographs import Measured, extract_photograph
 
+OPTIONS_AS_CONTROLS = {"--off": "laser-off images", "--roi": "rectangle"}
+"""Where an error is, in the words of the window."""
 THINNEST = 0.3
 """px, sigma of the image of a line; a lens and a colour mosaic alone make it wider."""
 
@@ -36,7 +39,7 @@ class MeasuredSet:
     def told_of(self, path: Path) -> str:
         """One line of text on a photograph."""
         if path not in self.lines:
-            return self.problems.get(path, "not measured")
+            return self.problems.get(path, "not measured yet: press Measure")
         line = self.lines[path].line
         found = line.valid[:, 0]
         count = self.look.region.scan_lines(len(found), line.axis)
@@ -44,7 +47,8 @@ class MeasuredSet:
             return f"no line found on {count} {line.axis}; {line.note}"
         sigma = float(np.nanmedian(line.sigma_u[found, 0]))
         width = float(np.median(line.width[found, 0]))
-        told = f"{found.sum()} of {count} {line.axis}, sigma {sigma:.3f} px, width {width:.2f} px"
+        told = f"{found.sum()} of {count} {line.axis}, line {width:.2f} px wide (sigma)"
+        told += f", position known to {sigma:.3f} px (1 sigma)"
         if width < THINNEST:
             told += ", thinner than a lens draws a line: is it an edge?"
         return f"{told}; {line.note}" if line.note else told
@@ -58,12 +62,20 @@ def measured_set(
     go_on: told which share is done; False ends it (None). InputError: laser-off images that do not go with the images.
     """
     settings = settings_of(None, select="continuous", smooth_along=True)
-    found = MeasuredSet(look_at(paths, settings, replace(wishes, count_lines=True)))
+    try:
+        found = MeasuredSet(look_at(paths, settings, replace(wishes, count_lines=True, words=CONTROLS)))
+    except InputError as error:
+        raise _in_controls(error) from None
     for number, path in enumerate(paths):
         if not go_on(number / len(paths)):
             return None
         try:
             found.lines[path] = extract_photograph(path, found.look)
         except InputError as error:
-            found.problems[path] = str(error)
+            found.problems[path] = str(_in_controls(error))
     return found
+
+
+def _in_controls(error: InputError) -> InputError:
+    where = OPTIONS_AS_CONTROLS.get(error.where, error.where)
+    return InputError(error.what, where=where, found=error.found, allowed=error.allowed, cure=error.cure)

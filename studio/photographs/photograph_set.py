@@ -29,6 +29,7 @@ from studio.photographs.evidence import (
     find_evidence,
     shrink,
 )
+from studio.photographs.evidence_words import OPTIONS, Words, told_of, warnings_of
 from studio.photographs.image_files import Photograph, load_photograph, read_photograph
 from studio.photographs.laser_light import ALL_FOUND, MOST_FOUND, TIE, Channel, channels_to_try, scatter_of
 from studio.photographs.mosaic import filled_in
@@ -54,6 +55,8 @@ class Wishes:
     """Of what points are to lie on, for the report."""
     count_lines: bool = False
     """As many peaks as lines stand out, whatever the settings say."""
+    words: Words = OPTIONS
+    """In which a person is told what to choose."""
 
 
 @dataclass(frozen=True)
@@ -168,11 +171,11 @@ def look_at(paths: Sequence[Path], settings: ExtractionSettings, wishes: Wishes)
     if not seen:
         return replace(look, settings=settings, told=told)
     evidence = find_evidence([one.shrunk for one in seen.values()], wishes.axis, wishes.colour)
-    told = evidence.told() + told
+    told = told_of(evidence, wishes.words) + told
     settings = settings.model_copy(update={"axis": evidence.axis, "channel": "auto"})
     if wishes.count_lines:
         settings = settings.model_copy(update={"peaks": evidence.lines})
-    look = replace(look, settings=settings, told=told, warnings=evidence.warnings, kept=kept)
+    look = replace(look, settings=settings, told=told, warnings=warnings_of(evidence, wishes.words), kept=kept)
     if settings.pattern is not None:
         found = evidence.colour if evidence.colour != "mono" else "auto"
         return replace(look, settings=settings.model_copy(update={"channel": found}))

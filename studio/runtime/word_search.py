@@ -4,6 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from difflib import SequenceMatcher
+
+FILLERS = {"a", "an", "the", "of", "to", "my"}
+"""Words that say nothing beside others."""
+ALIKE = 0.75
+"""Share of letters from which a word may be another, typed wrongly."""
+MOST = 8
 
 
 def found(typed: str, texts: Sequence[tuple[str, str]]) -> list[int]:
@@ -11,7 +18,7 @@ def found(typed: str, texts: Sequence[tuple[str, str]]) -> list[int]:
 
     A name that begins with what was typed comes before one that has it further on, and that before what is only told.
     """
-    words = _words(typed)
+    words = _told(typed)
     ranked = []
     for i, (name, more) in enumerate(texts):
         in_name, in_all = _words(name), _words(f"{name} {more}")
@@ -20,6 +27,33 @@ def found(typed: str, texts: Sequence[tuple[str, str]]) -> list[int]:
             first = bool(words) and bool(in_name) and in_name[0].startswith(words[0])
             ranked.append((not (alone and first), not alone, i))
     return [i for _, _, i in sorted(ranked)]
+
+
+def nearest(typed: str, texts: Sequence[tuple[str, str]]) -> list[int]:
+    """Indices of the few texts that fit best where none has all words: at least half of them, also typed wrongly."""
+    words, ranked = _told(typed), []
+    for i, (name, more) in enumerate(texts):
+        in_all = set(_words(f"{name} {more}"))
+        fit = sum(max((_likeness(word, one) for one in in_all), default=0.0) for word in words)
+        if words and fit >= 0.5 * len(words):
+            ranked.append((-fit, len(in_all), i))
+    return [i for _, _, i in sorted(ranked)[:MOST]]
+
+
+def _likeness(word: str, other: str) -> float:
+    """Of a typed word to the beginning of another; 0: it is another word."""
+    if other.startswith(word):
+        return 1.0
+    if len(word) < 4:  # of so few letters half are alike by chance
+        return 0.0
+    alike = SequenceMatcher(None, word, other[: len(word) + 1]).ratio()
+    return alike if alike >= ALIKE else 0.0
+
+
+def _told(typed: str) -> list[str]:
+    """The typed words that say something."""
+    words = _words(typed)
+    return [word for word in words if word not in FILLERS] or words
 
 
 def _words(text: str) -> list[str]:

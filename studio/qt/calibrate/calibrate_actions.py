@@ -61,6 +61,7 @@ class CalibrateActions(QObject):
             actions.connect(key, begin)
         self.photographs: PhotographWindow | None = None
         actions.connect("photographs", self.open_photographs)
+        actions.connect("export_photographs", lambda: self.open_photographs().export.ask())
         actions.connect("drop_view", self.toggle_view)
         actions.connect("save_calibration", panel.ask_and_save)
         actions.connect("use_calibration", lambda: use(self.work))

@@ -70,6 +70,14 @@ COMMANDS: tuple[Command | str, ...] = (
         "export_film", "File/Export", "Fil&m of the scan…", "", "", "A video as MP4: image and points, step by step"
     ),
     Command("export_heightmap", "File/Export", "&Height map of the scan…", "", "", "16 bit, with its scale beside it"),
+    Command(
+        "export_photographs",
+        "File/Export",
+        "Li&ne in photographs…",
+        "",
+        "",
+        "Points found in photographs, as CSV or PNG",
+    ),
     "File/Export/-",
     Command("screenshot", "File/Export", "&Screenshot of the window…", "Ctrl+Shift+P", "picture"),
     "File/-",

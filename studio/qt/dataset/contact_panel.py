@@ -4,18 +4,20 @@ lines."""
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QHelpEvent, QHideEvent, QImage, QPainter, QPaintEvent, QShowEvent
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QHelpEvent, QHideEvent, QImage, QMouseEvent, QPainter, QPaintEvent, QShowEvent
 from PySide6.QtWidgets import QLabel, QSizePolicy, QToolTip, QVBoxLayout, QWidget
 
 from studio.dataset.contact_sheet import Picture
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.session import Session, one_of
 from studio.qt.dataset.dataset_work import DatasetWork
+from studio.qt.dataset.large_picture import LargePicture
 
 GAP = 6
 LINE = QColor("#e69f00")
 LINE_WIDTH = 1.5
+SIMPLER = "So small, gloss and curves are rougher than in the images: a double click shows one as it will be."
 
 
 class ContactPanel(QWidget):
@@ -41,6 +43,7 @@ class ContactPanel(QWidget):
         layout.addWidget(self.sheet, 1)
         layout.addWidget(self.told)
         self.choice.activated.connect(lambda number: self.work.show_written(number == 1))
+        self.sheet.opened.connect(self.open_large)
         self.work.pictures_changed.connect(self._follow)
         self._follow()
 
@@ -51,6 +54,12 @@ class ContactPanel(QWidget):
     def hideEvent(self, event: QHideEvent) -> None:
         self.work.watched = False
         super().hideEvent(event)
+
+    def open_large(self, picture: Picture) -> LargePicture:
+        """In a window of its own."""
+        large = LargePicture(self.work, picture, self)
+        large.show()
+        return large
 
     def _follow(self) -> None:
         work = self.work
@@ -76,11 +85,14 @@ class ContactPanel(QWidget):
         which = f"the first {of_all} scenes of the recipe" if of_all < work.scenes else f"the {of_all} scenes"
         drawn = f"Preview: {which}" + (f", {made} of them so far" if made < of_all else "")
         again = f"; {anew} were drawn anew, as they showed no line" if anew else ""
-        return f"{drawn}{again}. The exact line is drawn on the upper half."
+        return f"{drawn}{again}. The exact line is drawn on the upper half. {SIMPLER}"
 
 
 class Sheet(QWidget):
     """The pictures in rows that fill the widget."""
+
+    opened = Signal(object)
+    """A picture, to be looked at large."""
 
     def __init__(self, work: DatasetWork) -> None:
         super().__init__()
@@ -114,14 +126,24 @@ class Sheet(QWidget):
             else:
                 _paint(painter, place, picture)
 
+    def picture_at(self, point: QPointF) -> Picture | None:
+        """None: there is none, or none yet."""
+        return next((one for number, one in self.work.on_sheet.items() if self.place(number).contains(point)), None)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        picture = self.picture_at(event.position())
+        if picture is not None:
+            self.opened.emit(picture)
+
     def event(self, event: QEvent) -> bool:
         if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
-            for number, picture in self.work.on_sheet.items():
-                if self.place(number).contains(QPointF(event.pos())):
-                    anew = f"; drawn anew: {', '.join(picture.rejected)}" if picture.rejected else ""
-                    what = "image" if self.work.shows_written else "scene"
-                    QToolTip.showText(event.globalPos(), f"{what} {picture.number}{anew}", self)
-                    return True
+            picture = self.picture_at(QPointF(event.pos()))
+            if picture is not None:
+                anew = f"; drawn anew: {', '.join(picture.rejected)}" if picture.rejected else ""
+                what = "image" if self.work.shows_written else "scene"
+                told = f"{what} {picture.number}{anew}. A double click shows it large"
+                QToolTip.showText(event.globalPos(), told, self)
+                return True
         return super().event(event)
 
     def _columns(self, aspect: float) -> int:

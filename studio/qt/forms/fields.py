@@ -101,9 +101,12 @@ class TextField(QLineEdit):
             self.refused.emit("")
 
     def reject(self) -> None:
-        """The value was refused after all: it stays typed, to be mended."""
-        self.pending = True
-        self.set_invalid(True)
+        """The value was refused after all: what was typed stays, to be mended; a step of the arrows is not made."""
+        self.pending = self.text() != self._shown
+        self.set_invalid(self.pending)
+        if not self.pending:
+            self.given_up.emit()
+            self.refused.emit("")
 
     def _edited(self, text: str) -> None:
         self.pending = text != self._shown

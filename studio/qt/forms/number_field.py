@@ -63,15 +63,29 @@ class NumberField(TextField):
     def read(self, text: str) -> Any:
         if self.spec.optional and not text.strip():
             return None
-        value: float = self.spec.unit.parse(text)
+        try:
+            value: float = self.spec.unit.parse(text)
+        except InputError as error:
+            if self.spec.kind != "integer":
+                raise
+            raise InputError(error.what, found=error.found, allowed=self._whole()) from None
         if self.spec.kind == "integer":
             if value != int(value):
-                raise InputError("must be a whole number")
+                raise InputError("must be a whole number", allowed=self._whole())
             value = int(text) if text.strip().lstrip("+-").isdigit() else int(value)
         problem = self.spec.problem(value)
         if problem is not None:
             raise InputError(problem)
         return value
+
+    def _whole(self) -> str:
+        """What an integer may be."""
+        spec = self.spec
+        low, high = spec.low, spec.high
+        low = low + 1 if low is not None and spec.low_open else low
+        high = high - 1 if high is not None and spec.high_open else high
+        ends = [f"{word} {spec.unit.with_unit(end)}" for word, end in (("from", low), ("to", high)) if end is not None]
+        return " ".join(["a whole number", *ends])
 
     def show_value(self, value: Any) -> None:
         self._value = value
@@ -187,8 +201,8 @@ class NumberField(TextField):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
-        # "no line" is no number of degrees
-        if self.suffix and (self.text() or not self.placeholderText()):
+        # where none may be typed its unit is known before; "no line" is no number of degrees
+        if self.suffix and (self.text() or self.spec.optional or not self.placeholderText()):
             painter = QPainter(self)
             painter.setPen(self.palette().color(QPalette.ColorRole.PlaceholderText))
             area = self.rect().adjusted(0, 0, -6, 0)

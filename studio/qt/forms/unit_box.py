@@ -6,6 +6,7 @@ from typing import Any
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QPaintEvent, QValidator
+from PySide6.QtWidgets import QLabel
 
 from render.base.errors import InputError
 from studio.editing.units import Unit
@@ -27,6 +28,9 @@ class UnitBox(DecimalBox):
         super().__init__(decimals=decimals, minimum=low, maximum=high, **properties)
         self.setSuffix(unit.shown if unit.shown == "°" else f" {unit.shown}".rstrip())
         self.setKeyboardTracking(False)
+        self._beside = QLabel(unit.shown, self.lineEdit())
+        self._beside.setObjectName("muted")
+        self._beside.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.lineEdit().textChanged.connect(lambda _: self.update())
 
     @property
@@ -68,8 +72,17 @@ class UnitBox(DecimalBox):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
+        self._show_unit()  # here, as Qt tells nobody of a text that it sets itself
         if self.problem:
             outline(self)
+
+    def _show_unit(self) -> None:
+        """Beside a word that stands for no number, where it has room: what is typed in its place is in that unit."""
+        word, line, beside = self.specialValueText(), self.lineEdit(), self._beside
+        beside.adjustSize()
+        beside.move(line.width() - beside.width() - 4, (line.height() - beside.height()) // 2)
+        room = line.width() - self.fontMetrics().horizontalAdvance(word) - beside.width() > 12
+        beside.setVisible(bool(word) and self.text() == word and room)
 
     def _refuse(self, why: str) -> None:
         name = self.accessibleName()

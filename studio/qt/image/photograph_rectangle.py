@@ -17,6 +17,7 @@ from studio.qt.image.image_item import PictureView
 Box = tuple[int, int, int, int]
 """Left, top, width and height, px."""
 TIP = "Drag it, its sides and its corners in the photograph, or draw another with Shift held down"
+HOW = "Shift + drag in the photograph draws one"
 NAMES = ("Left", "Top", "Width", "Height")
 WIDEST = 1_000_000
 """px; no photograph has more."""
@@ -138,6 +139,10 @@ class PhotographRectangle(QWidget):
             layout.addWidget(box, 1 + k // 2, 1 + 2 * (k % 2))
             layout.setColumnStretch(1 + 2 * (k % 2), 1)
             box.valueChanged.connect(self._take_numbers)
+        self.how = QLabel(HOW)
+        self.how.setObjectName("muted")
+        self.how.setToolTip(TIP)
+        layout.addWidget(self.how, 3, 0, 1, 4)
         self.limited.toggled.connect(self._limit)
         self.outline.sigRegionChanged.connect(self._follow_outline)
         self.outline.sigRegionChangeFinished.connect(lambda *_: self.put(self.box))

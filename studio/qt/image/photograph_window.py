@@ -36,8 +36,9 @@ from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
-from studio.qt.core.widgets import ShareBar, text_button
+from studio.qt.core.widgets import ShareBar, breakable, text_button
 from studio.qt.image.image_item import PictureView
+from studio.qt.image.photograph_export import PhotographExport
 from studio.qt.image.photograph_rectangle import PhotographRectangle
 from studio.qt.image.zooms import Zooms
 from studio.runtime.jobs import Job, Progress
@@ -48,6 +49,7 @@ EMPTY = "Drop photographs of the line here, several of one set, or add them."
 FILTER = "Images ({});;All files (*)"
 CHOICES = {"colour": ("auto", "mono", "red", "green", "blue"), "axis": ("auto", "rows", "columns")}
 AUTO = "auto"
+NOT_YET = "Press Measure to find the line in {}."
 OLD = "Settings have changed: these figures are of those before. Measure again for new ones."
 NO_RENDER = "Nothing is rendered yet: Render (F5), and the image appears here"
 NOT_CHOSEN = "No render is chosen: choose one in the list of the Render workspace"
@@ -83,10 +85,12 @@ class PhotographWindow(QWidget):
         self.off_button = text_button("Laser off…", "One for all photographs, or one each by name or order")
         self.off_told = QLabel("none")
         self.measure_button = text_button("Measure", "The line in all photographs of the set", "primary")
+        self.export = PhotographExport(session, self.runner, lambda: self.found, self._shown)
         self.bar = ShareBar()
         self.old, self.told, self.chosen, self.problem = QLabel(OLD), QLabel(EMPTY), QLabel(), QLabel()
+        self.written = QLabel()
         self.old.setObjectName("warning")
-        for label in (self.old, self.told, self.chosen, self.problem):
+        for label in (self.old, self.told, self.chosen, self.problem, self.written):
             label.setWordWrap(True)
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.problem.setObjectName("error")
@@ -146,6 +150,7 @@ class PhotographWindow(QWidget):
         if not self.paths:
             return
         self.problem.clear()
+        self.written.clear()
         paths, wishes = list(self.paths), self.wishes()
         self._asked_for = paths, wishes
         self._show_age()
@@ -207,7 +212,7 @@ class PhotographWindow(QWidget):
         texts = QWidget()
         column = QVBoxLayout(texts)
         column.setContentsMargins(0, 0, 0, 0)
-        for label in (self.problem, self.old, self.told, self.chosen):
+        for label in (self.problem, self.written, self.old, self.told, self.chosen):
             column.addWidget(label)
         column.addStretch(1)
         # texts of any length have room of their own, so that no control moves
@@ -215,8 +220,12 @@ class PhotographWindow(QWidget):
         results.setFrameShape(QScrollArea.Shape.NoFrame)
         results.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         results.setWidget(texts)
-        for widget in (self.rectangle, self.measure_button, self.bar):
-            left.addWidget(widget)
+        work = QHBoxLayout()
+        work.addWidget(self.measure_button, 1)
+        work.addWidget(self.export)
+        left.addWidget(self.rectangle)
+        left.addLayout(work)
+        left.addWidget(self.bar)
         left.addWidget(results, 2)
         controls = QWidget()
         controls.setLayout(left)
@@ -252,6 +261,7 @@ class PhotographWindow(QWidget):
         self.clear_button.clicked.connect(self.clear)
         self.off_button.clicked.connect(self._ask_off)
         self.measure_button.clicked.connect(self.measure)
+        self.export.told.connect(lambda text: self.written.setText(breakable(text)))
         for signal in (self.colour.currentIndexChanged, self.axis.currentIndexChanged, self.rectangle.changed):
             signal.connect(lambda *_: self._show_age())
         self.bright.toggled.connect(lambda on: self._show_rendered())
@@ -284,8 +294,11 @@ class PhotographWindow(QWidget):
         self.off_told.setText(", ".join(path.name for path in self.offs) or "none")
         if not self.paths:
             self.told.setText(EMPTY)
-            self.chosen.clear()
-            self.problem.clear()
+            for label in (self.chosen, self.problem, self.written):
+                label.clear()
+        elif self.found is None:
+            count = len(self.paths)
+            self.told.setText(NOT_YET.format("this photograph" if count == 1 else f"these {count} photographs"))
         self._show_age()
 
     def _shown(self) -> Path | None:
@@ -319,9 +332,10 @@ class PhotographWindow(QWidget):
 
     def _failed(self, job: Job[object]) -> None:
         self.bar.setVisible(False)
-        self.problem.setText(str(job.problem))
+        self.problem.setText(job.problem.text if job.problem is not None else "")
 
     def _show_line(self) -> None:
+        self.export.refresh()
         path, empty = self._shown(), np.zeros(0)
         measured = None if self.found is None or path is None else self.found.lines.get(path)
         for item in (self.sure, self.doubtful):

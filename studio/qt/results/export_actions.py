@@ -44,12 +44,12 @@ KINDS = {
     "export_pdf": ("Report (*.pdf)", ".pdf", "report"),
     "export_exr": ("OpenEXR frame (*.exr)", ".exr", "frame"),
     "export_png": ("PNG image (*.png)", ".png", "image"),
-    "export_ply": ("PLY points (*.ply)", ".ply", "points"),
-    "export_csv": ("CSV table (*.csv)", ".csv", "points"),
-    "export_pcd": ("PCD points (*.pcd)", ".pcd", "points"),
-    "export_xyz": ("XYZ points (*.xyz)", ".xyz", "points"),
-    "export_las": ("LAS points (*.las)", ".las", "points"),
-    "export_e57": ("E57 points (*.e57)", ".e57", "points"),
+    "export_ply": ("PLY points, metres (*.ply)", ".ply", "points"),
+    "export_csv": ("CSV table, metres (*.csv)", ".csv", "points"),
+    "export_pcd": ("PCD points, metres (*.pcd)", ".pcd", "points"),
+    "export_xyz": ("XYZ points, metres (*.xyz)", ".xyz", "points"),
+    "export_las": ("LAS points, metres (*.las)", ".las", "points"),
+    "export_e57": ("E57 points, metres (*.e57)", ".e57", "points"),
     "export_film": ("Film (*.mp4)", ".mp4", "film"),
     "export_heightmap": ("Height map, 16 bit (*.png)", ".png", "height map"),
 }
@@ -155,18 +155,16 @@ class ExportActions(QObject):
                 left_out.append(f"{beyond} {KEEP_ALL}")
             return written
 
-        notes = scale_notes(render.scanner_scale)
-        if kind == "report":
-            notes = (*notes, *logo_remarks(now, self.session.document.root))
         left_out: list[str] = []
-        known: list[str] = []
+        known = list(scale_notes(render.scanner_scale))
+        notes = logo_remarks(now, self.session.document.root) if kind == "report" else []
 
         def then(written: list[Path]) -> None:
             if kind == "report" and whole is None:
                 render.report = written[0]
             method = (how.project if whole is None else scan_steps(self.session).measured_as(render)).extraction.method
             own = "the project's own method" if whole is None else "as the scan was measured last"
-            said = f", the points by {method_name(method)}, {own}" if kind == "points" else ""
+            said = f", the points in metres by {method_name(method)}, {own}" if kind == "points" else ""
             self._tell(written, said + (f", of {of}" if of else ""), (*notes, *left_out), known)
 
         self._tell_wait(path)
@@ -214,7 +212,7 @@ class ExportActions(QObject):
             self.session.message.emit("info", f"Cancelled: {job.name}. No file was written")
 
     def _tell(self, written: list[Path], of: str, notes: tuple[str, ...], known: Sequence[str]) -> None:
-        """known: what is so as ever, and no warning."""
+        """notes: what a file has not as was asked; known: what is so of what was asked, and no warning."""
         names = ", ".join(str(path) for path in written) + of
         self.session.message.emit("warning" if notes else "info", "\n".join([f"Wrote {names}", *notes, *known]))
 

@@ -31,7 +31,7 @@ from studio.qt.core.widgets import text_button
 from studio.qt.scene import mesh_importer
 
 REPLACES = "Another mesh file in its place, shaded as an import of it is; pose, scale and material stay"
-SCALES = "Changes its size: it is scaled until it fills the camera's view, and put in the middle of that"
+SCALES = "Changes its size: it fills the camera's view, in the middle of that, or where it stands on another part"
 ON_TOP = "Its lowest point as high as the highest place of other objects below or around it, seen from above"
 CENTRE = "The middle of its box over the turntable's axis point, or the origin where nothing turns; its height stays"
 
@@ -122,14 +122,17 @@ class MeshBar(QWidget):
         """The size of a part is what is measured: that it is another one now is said."""
         item, scene = selected_mesh(self.session), self.session.project.scene
         vertices = None if item is None else self._vertices(item)
-        self._place("scale to fit", lambda item, vertices: mesh_placing.fitted(item, vertices, scene))
+        others = [] if item is None else self._others(item)
+        self._place("scale to fit", lambda item, vertices: mesh_placing.fitted(item, vertices, scene, others))
         now = selected_mesh(self.session)
         if item is None or now is None or vertices is None or now is item:
             return
         by, length = now.scale / item.scale, Unit.of("m")
         before = float((vertices.max(axis=0) - vertices.min(axis=0)).max())
         sizes = " became ".join(f"{length.factor * size:.4g} {length.shown}" for size in (before, by * before))
-        still = "; it still stands on the ground" if mesh_placing.stands(item, vertices) else ""
+        on_others = mesh_placing.rests(item, vertices, others)
+        where = "the ground" if mesh_placing.stands(item, vertices) else "what is below it" if on_others else ""
+        still = f"; it still stands on {where}" if where else ""
         self.session.message.emit("info", f"{now.name} is scaled by {by:.3g}: {sizes}{still}; Ctrl+Z takes it back")
 
     def _put_down(self) -> None:
@@ -150,9 +153,7 @@ class MeshBar(QWidget):
         item = selected_mesh(self.session)
         if item is None:
             return
-        look = live(self.session).look
-        others = [one for one in look.placed if _size(look.scene.visible_objects[one.index]) != _size(item)]
-        triangles = [_triangles(one) for one in others]
+        triangles = self._others(item)
         if self._place("put on top", lambda item, vertices: mesh_placing.on_top(item, vertices, triangles)):
             self._tell_move(item, "its lowest point to the top of what is below it, or to the ground", "on top")
 
@@ -173,6 +174,11 @@ class MeshBar(QWidget):
         sense = "" if np.any(np.abs(by[:2]) > 1e-9) else " up" if by[2] > 0.0 else " down"
         moved = f"{now.name} moved {far:.4g} mm{sense}, {where}; Ctrl+Z takes it back"
         self.session.message.emit("info", moved if far >= LEAST_MOVE else f"{now.name} stood {already} already")
+
+    def _others(self, item: SceneObject) -> list[Float]:
+        """(t, 3, 3) m corners in the world of each other object."""
+        look = live(self.session).look
+        return [_triangles(one) for one in look.placed if _size(look.scene.visible_objects[one.index]) != _size(item)]
 
     def _place(self, label: str, change: Callable[[SceneObject, Float], SceneObject]) -> bool:
         """False: it cannot be done, which is told where there is something to tell."""

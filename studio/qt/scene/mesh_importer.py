@@ -9,6 +9,8 @@ from PySide6.QtCore import QCoreApplication, QThread, Signal
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
 from render.base.errors import InputError
+from render.laser.laser import LineLaser
+from render.material.spectrum import at_wavelength
 from studio.editing.placement import field_of_view
 from studio.editing.scene_edits import add_mesh, add_parts
 from studio.preview.readouts import facet_chord, readouts
@@ -20,6 +22,8 @@ from studio.qt.core.session import Session
 from studio.runtime.error_messages import trouble
 
 MESH_FILES = "Meshes and STEP (*.stl *.ply *.obj *.glb *.gltf *.off *.step *.stp);;All files (*)"
+DARK = 0.1
+"""Share of the laser's light below which a part is told to reflect little of it."""
 Take = Callable[[ImportedMesh], None]
 
 
@@ -104,6 +108,9 @@ def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Ta
         session.message.emit("info", _told(meshes, chord, wanted))
         if take is None:
             _add(session, meshes)
+            level, text = colour_told(meshes, session.project.scene.lasers)
+            if text:
+                session.message.emit(level, text)
         else:
             take(meshes[0])
 
@@ -143,6 +150,28 @@ def _told(meshes: list[ImportedMesh], chord: float, wanted: float) -> str:
     why = tenth if chord == wanted else f"{tenth} is {1e6 * wanted:.2g} µm"
     facets = f"facets at most {1e6 * chord:.2g} µm off ({why})"
     return f"{parts} in {Path(first.path).parent.as_posix()}, {size} mm, {triangles} triangles{closed}; {facets}"
+
+
+def colour_told(meshes: list[ImportedMesh], lasers: tuple[LineLaser, ...]) -> tuple[str, str]:
+    """Level and text of what the colours that a file brings are to the lasers; no text: it brings none.
+
+    They were chosen for a screen, and are the part's reflectance from now on.
+    """
+    found = [
+        (at_wavelength(mesh.colour, laser.wavelength_nm), laser.wavelength_nm, mesh.name)
+        for mesh in meshes
+        if mesh.colour is not None
+        for laser in lasers
+    ]
+    if not found:
+        return "info", ""
+    least, wavelength, name = min(found)
+    others = sum(share < DARK for share, _, _ in found) - 1
+    more = f", and {others} more as little" if others > 0 else ""
+    dark = " and is nearly black to it" if least < DARK else ", the least of all" if len(found) > 1 else ""
+    reflects = f"{name} reflects {least:.0%} of the laser's light of {wavelength:g} nm{dark}{more}"
+    told = f"Colours are those that the file has for the screen: {reflects}. Material, Albedo changes it"
+    return "warning" if least < DARK else "info", told
 
 
 def _add(session: Session, meshes: list[ImportedMesh]) -> None:

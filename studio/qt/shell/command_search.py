@@ -17,12 +17,13 @@ from studio.project.document import FieldPath
 from studio.qt.core import theme
 from studio.qt.scene.field_menu import named_fields
 from studio.qt.scene.scene_nodes import nodes
-from studio.runtime.word_search import found
+from studio.runtime.word_search import found, nearest
 
 if TYPE_CHECKING:
     from studio.qt.shell.window import MainWindow
 
 NOTHING = "Nothing found: no command and no field has these letters"
+NEAREST = "Nothing has all of these words. Nearest:"
 SIZE = (560, 420)
 PASSED_ON = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 WORDS = {
@@ -39,6 +40,9 @@ WORDS = {
     "expose": "brightness dark bright saturated",
     "scan": "conveyor turntable speed all frames",
     "photographs": "real camera phone rectangle region",
+    **{f"export_{kind}": "save write points cloud" for kind in ("ply", "csv", "pcd", "xyz", "las", "e57")},
+    "aim": "tilt turn rotate direct angle",
+    "export_photographs": "export save photograph points table picture",
     "deviation": "compare CAD tolerance surface",
     "heights": "depth range image topography",
     "shortcuts": "keys keyboard",
@@ -96,7 +100,11 @@ class CommandSearch(QDialog):
         self.list.clear()
         muted = QColor(theme.colours().muted)
         texts = [(f"{entry.name} {entry.words}", entry.more) for entry in self.entries]
-        for i in found(typed, texts):
+        fits = found(typed, texts)
+        near = [] if fits else nearest(typed, texts)
+        if not fits:
+            self._say(NEAREST if near else NOTHING)
+        for i in fits or near:
             entry = self.entries[i]
             if entry.is_field and not typed.strip():
                 continue  # hundreds of them would hide that these are all commands
@@ -106,11 +114,13 @@ class CommandSearch(QDialog):
             if not entry.possible:
                 item.setForeground(muted)
             self.list.addItem(item)
-        self.list.setCurrentRow(0)
-        if self.list.count() == 0:
-            nothing = QListWidgetItem(NOTHING)
-            nothing.setFlags(Qt.ItemFlag.NoItemFlags)
-            self.list.addItem(nothing)
+        self.list.setCurrentRow(1 if near else 0)
+
+    def _say(self, text: str) -> None:
+        """A line that cannot be chosen."""
+        line = QListWidgetItem(text)
+        line.setFlags(Qt.ItemFlag.NoItemFlags)
+        self.list.addItem(line)
 
     def choose(self) -> None:
         """Do what is marked, after this window has gone: it may open one of its own."""

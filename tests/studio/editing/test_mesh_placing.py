@@ -22,6 +22,7 @@ from studio.editing.mesh_placing import (
     on_its_foot,
     on_top,
     reaches_into,
+    rests,
     stands,
     up_axis,
     with_axis_up,
@@ -93,6 +94,22 @@ def test_what_stands_on_the_ground_still_stands_there_when_it_is_fitted(vertices
     assert abs(places[:, 2].min()) < NANOMETRE
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0)) * made.scale / ITEM.scale
     assert in_world(made, middle[None])[0, :2] == pytest.approx(target(scene)[:2], abs=NANOMETRE)
+
+
+def test_what_rests_on_a_tilted_plane_still_does_when_it_is_fitted_and_has_not_moved_aside(vertices: Float) -> None:
+    """It sank into it, about the origin of its file."""
+    scene = Project.load(template_folder("plane") / "project.json").scene
+    slope = np.array([[[-9.0, -9.0, -4.0], [9.0, -9.0, 4.0], [0.0, 18.0, 1.0]]])
+    for start in (ITEM, ITEM.model_copy(update={"scale": 0.01})):
+        own = vertices * start.scale / ITEM.scale
+        resting = on_top(start, own, [slope])
+        assert rests(resting, own, [slope]) and not rests(ITEM, vertices, [slope])
+        made = fitted(resting, own, scene, [slope])
+        scaled = vertices * made.scale / ITEM.scale
+        places, before = in_world(made, scaled), in_world(resting, own)
+        assert made.scale != resting.scale and rests(made, scaled, [slope]) and not reaches_into(places, slope)
+        middles = [0.5 * (one.min(axis=0) + one.max(axis=0))[:2] for one in (before, places)]
+        assert middles[0] == pytest.approx(middles[1], abs=2 * NANOMETRE)
 
 
 def test_on_top_of_what_is_below_it_seen_from_above(vertices: Float) -> None:

@@ -17,6 +17,7 @@ from PIL import Image
 import main
 from studio.photographs.bands import course
 from studio.photographs.evidence import AXES, DOUBTFUL, Chain, find_evidence, shrink
+from studio.photographs.evidence_words import CONTROLS, OPTIONS, told_of, warnings_of
 from studio.photographs.image_files import has_coarse_colour
 from tests.studio.photographs.colour_photographs import HEIGHT, Scene, photograph, write
 
@@ -64,7 +65,7 @@ def test_two_lines_that_are_alike_hide_neither_themselves_nor_which_way_they_run
     for seed in range(5):
         image = np.rint(20.0 + lines + np.random.default_rng(seed).normal(size=x.shape)).astype(np.uint8)
         evidence = find_evidence([shrink(image if axis == "rows" else image.T, None)])
-        assert (evidence.axis, evidence.lines) == (axis, 2) and not evidence.warnings
+        assert (evidence.axis, evidence.lines) == (axis, 2) and not warnings_of(evidence)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -93,7 +94,7 @@ def test_a_rectangle_about_the_line_says_its_colour_as_the_whole_photograph_does
         whole, within = (find_evidence([shrink(one, None)]) for one in (image, part))
         assert whole.colour == within.colour == ("red", "green")[colour]
         assert within.combination.name == "mono" and within.light is not None
-        told = dict(within.told())
+        told = dict(told_of(within))
         assert told["laser's colour"].startswith(f"{within.colour} (of the line's light ")
         assert told["looked for in"].startswith("mono, all channels together (")
 
@@ -107,7 +108,7 @@ def test_a_line_of_grey_or_lamp_light_has_no_colour_and_says_what_light_it_has(l
     evidence = find_evidence([shrink(image, None)])
     assert evidence.colour == "mono" and evidence.light is not None
     assert list(evidence.light.values()) == pytest.approx(np.divide(lamp, sum(lamp)), abs=0.005)
-    assert "none has much more than the others" in dict(evidence.told())["laser's colour"]
+    assert "none has much more than the others" in dict(told_of(evidence))["laser's colour"]
 
 
 def test_a_white_core_is_not_measured_in_the_difference_which_is_hollow(tmp_path: Path) -> None:
@@ -308,8 +309,16 @@ def test_what_is_taken_for_a_line_where_there_is_none_is_doubted() -> None:
     room = Scene(room=40.0)
     for seed in range(3):
         of_edges = find_evidence([shrink(photograph(room, seed, laser=False), None)])
-        assert of_edges.score < DOUBTFUL and of_edges.warnings
+        assert of_edges.score < DOUBTFUL and warnings_of(of_edges)
         of_line = find_evidence([shrink(photograph(room, seed), None)])
-        assert of_line.score > 2.0 * DOUBTFUL and not of_line.warnings
+        assert of_line.score > 2.0 * DOUBTFUL and not warnings_of(of_line)
     weak = replace(of_line, scores={axis: dict.fromkeys(names, 0.23) for axis, names in of_line.scores.items()})
-    assert any("evidence 0.23" in text and "may be an edge" in text for text in weak.warnings)
+    assert any("evidence 0.23" in text and "may be an edge" in text for text in warnings_of(weak))
+
+
+def test_the_other_axis_is_named_as_the_reader_chooses_it() -> None:
+    across = find_evidence([shrink(photograph(Scene(room=40.0), 1), None)], axis="columns")
+    by_options, by_controls = (warnings_of(across, words)[0] for words in (OPTIONS, CONTROLS))
+    assert "give --axis rows" in by_options
+    assert "choose Scan axis: rows" in by_controls and "--" not in by_controls
+    assert by_controls.index("instead") < by_controls.index("Scan axis: rows") < by_controls.index("evidence")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from studio.runtime.word_search import found
+from studio.runtime.word_search import found, nearest
 
 TEXTS = (
     ("Open…", "File: a project file"),
@@ -23,6 +23,8 @@ TEXTS = (
         ("REP pd", [1]),
         ("pdf report", [1]),
         ("sc", [2, 3, 5]),
+        ("run a scan", [2]),
+        ("the", [2]),
         ("port", []),
         ("étu", [4]),
         ("+z", [5]),
@@ -38,3 +40,11 @@ def test_words_are_found_by_how_they_begin_in_any_order(typed: str, expected: li
 def test_a_name_comes_before_a_place_and_its_beginning_before_its_middle() -> None:
     texts = [("Close", "Scan"), ("Run the scan", ""), ("Scan again", "")]
     assert found("scan", texts) == [2, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("typed", "expected"),
+    [("raport", [1, 2]), ("print a letter", [1]), ("reprot pdf", [1]), ("xyz", []), ("nothing of this", []), ("", [])],
+)
+def test_where_none_has_all_words_the_nearest_have_most_of_them(typed: str, expected: list[int]) -> None:
+    assert nearest(typed, TEXTS) == expected

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
@@ -20,6 +21,7 @@ from studio.qt.core.session import Session, one_of
 from studio.qt.dataset.contact_panel import ContactPanel
 from studio.qt.dataset.dataset_work import DatasetWork
 from studio.qt.dataset.draw_row import DrawRow
+from studio.qt.dataset.large_picture import LANE, LargePicture
 from studio.qt.dataset.recipe_panel import RecipePanel
 from studio.runtime.workers import Engine
 from studio.study.draft import spec_of
@@ -128,6 +130,7 @@ def test_the_sheet_is_said_to_be_a_preview(desk: Desk, qtbot: QtBot) -> None:
     """With two scenes to be made it said "24 of 24 scenes"."""
     qtbot.waitUntil(lambda: desk.ready)
     assert desk.sheet.told.text().startswith("Preview: the first 3 scenes of the recipe")
+    assert "gloss and curves are rougher than in the images" in desk.sheet.told.text()
     there = dict(desk.work.pictures)
     desk.panel.scenes.setValue(2)  # fewer draw nothing anew, and no scene is shown that will not be there
     assert desk.sheet.told.text().startswith("Preview: the 2 scenes.") and not desk.work.drawing
@@ -295,3 +298,37 @@ def add_field(desk: Desk, field: str) -> None:
     spec = spec_of(desk.work.base, field)
     assert spec is not None
     desk.work.add(tuple(parts_of(field)), spec)
+
+
+def test_a_double_click_shows_a_picture_large_with_its_line(desk: Desk, qtbot: QtBot, tmp_path: Path) -> None:
+    sheet = desk.sheet.sheet
+    qtbot.waitUntil(lambda: desk.ready)
+    opened: list[LargePicture] = []
+    sheet.opened.connect(lambda picture: opened.append(desk.sheet.findChildren(LargePicture)[-1]))
+
+    def open_first() -> LargePicture:
+        qtbot.mouseDClick(sheet, Qt.MouseButton.LeftButton, pos=sheet.place(1).center().toPoint())
+        large = opened[-1]
+        qtbot.waitUntil(lambda: large.runner.job(LANE) is None)
+        return large
+
+    large = open_first()
+    assert large.isVisible() and large.windowTitle().startswith("Scene 1 of ")
+    assert desk.work.base is not None
+    camera = desk.work.base.scene.camera
+    whole = round(0.05 * camera.width), round(0.05 * camera.height)
+    assert large.view.item.size == whole and "as a run renders it" in large.told.text()
+    x, y = large.line.getData()
+    assert len(x) > 3 and x.max() < whole[0] and y.max() < whole[1]
+    large.with_line.setChecked(False)
+    assert not large.line.isVisible()
+    large.close()
+    desk.work.choose_count(2)
+    desk.work.choose_folder(tmp_path / "images")
+    desk.work.start()
+    qtbot.waitUntil(lambda: desk.work.shows_written)
+    written = open_first()
+    assert written.windowTitle().startswith("Image 1 of ") and written.told.text().startswith(
+        f"{whole[0]} x {whole[1]}"
+    )
+    written.close()

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QLineEdit, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
 from studio.editing.units import Unit
@@ -74,3 +74,16 @@ def test_arrows_step_what_has_been_typed(asked: Asked, qtbot: QtBot) -> None:
     qtbot.keyClicks(box.lineEdit(), "1 mm")
     qtbot.keyClick(box.lineEdit(), Qt.Key.Key_Up)
     assert box.value() == 1001.0
+
+
+def test_a_word_in_place_of_a_number_has_the_unit_beside_it(asked: Asked, qtbot: QtBot) -> None:
+    """Half a millimetre was typed into an empty field, and was half a micrometre."""
+    box, _, _ = asked
+    (unit,) = box.lineEdit().findChildren(QLabel)
+    assert not unit.isVisible()
+    box.setValue(box.minimum())
+    qtbot.waitUntil(unit.isVisible)
+    assert box.text() == "none" and unit.text() == "µm"
+    assert unit.geometry().right() < box.lineEdit().width()
+    box.setFixedWidth(60)
+    qtbot.waitUntil(lambda: not unit.isVisible())

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 from studio.qt.image.image_item import PictureView
 from studio.qt.image.photograph_rectangle import PhotographRectangle
+from studio.qt.image.photograph_window import CONTROLS
 
 WIDTH, HEIGHT = 400, 300
 FIRST = (100, 75, 200, 150)
@@ -118,6 +119,12 @@ def test_one_is_drawn_with_shift_wherever_another_was(made):
     assert np.abs(np.subtract(numbers(made), (120, 90, 40, 50))).max() <= 1
     drag(made.view, (150, 130), (130, 100), Qt.KeyboardModifier.ShiftModifier)
     assert np.abs(np.subtract(numbers(made), (130, 100, 20, 30))).max() <= 1
+
+
+def test_how_one_is_drawn_is_said_beside_its_numbers(made):
+    how = made.rectangle.how
+    assert how.isVisible() and how.text().startswith("Shift + drag")
+    assert how.sizeHint().width() < CONTROLS
 
 
 def test_it_is_seen_on_what_is_bright_and_on_what_is_dark(made):

@@ -58,6 +58,18 @@ def test_the_line_of_each_is_drawn_where_it_is_and_told_with_what_was_chosen(qtb
     assert made.view.item.size == photograph(SCENE, seed=1).shape[1::-1]
 
 
+def test_it_says_what_to_do_next_and_then_whose_width_and_whose_sigma_the_figures_are(qtbot, made, tmp_path):
+    made.clear()
+    assert "Drop photographs" in made.told.text()
+    made.add([tmp_path / "1.png", tmp_path / "2.png"])
+    assert made.told.text() == "Press Measure to find the line in these 2 photographs."
+    measured(qtbot, made)
+    assert "px wide (sigma), position known to 0." in made.told.text() and "(1 sigma)" in made.told.text()
+    made.axis.setCurrentText("columns")
+    measured(qtbot, made)
+    assert "choose Scan axis: rows" in made.chosen.text() and "--" not in made.chosen.text()
+
+
 def test_the_rendered_image_of_the_project_stands_beside_it(qtbot, made):
     assert made.no_render.isVisible() and "being developed" in made.no_render.text()
     shown = made.session.shown
@@ -124,6 +136,11 @@ def test_what_cannot_be_measured_is_said_and_the_others_go_on(qtbot, made, tmp_p
     assert len(points(made)[0]) > 0.98 * HEIGHT
     other = tmp_path / "other.png"
     write(other, photograph(SCENE, seed=4, laser=False)[:50])
+    made.set_offs([other])
+    measured(qtbot, made)
+    made.set_offs([other, other, other, other])
+    measured(qtbot, made)
+    assert made.problem.text().startswith("laser-off images: ") and "--" not in made.problem.text()
     made.set_offs([other])
     measured(qtbot, made)
     assert "size" in made.problem.text() or "size" in made.told.text()

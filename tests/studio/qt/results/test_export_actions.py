@@ -158,3 +158,21 @@ def test_the_name_of_a_file_is_told_once_while_it_is_written(
         actions.write("export_csv", tmp_path / "a.csv")
     assert f"{ended.args[0].name}: {ended.args[0].stage}".count("a.csv") == 1
     runner.close()
+
+
+def test_points_say_their_unit_and_those_of_another_image_scale_are_no_warning(
+    measured: tuple[Session, DevelopPanel], qtbot: QtBot, tmp_path: Path
+) -> None:
+    """The window shows mm, and files are in m; what was written at half the scale was told as a warning."""
+    session = measured[0]
+    assert all("metres" in KINDS[key][0] for key in KINDS if KINDS[key][2] == "points")
+    told: list[tuple[str, str]] = []
+    session.message.connect(lambda level, text: told.append((level, text)))
+    render = session.shown
+    assert render is not None
+    render.image_scale = 0.5
+    assert render.scanner_scale != 1.0
+    places = np.array([line.split() for line in export(session, tmp_path / "p.xyz", qtbot, "export_xyz").splitlines()])
+    (level, text), *_ = [one for one in told if "Wrote" in one[1]]
+    assert level == "info" and "p.xyz, the points in metres by " in text and "full size" in text.casefold()
+    assert np.abs(places.astype(float)).max() < 10.0

@@ -8,8 +8,10 @@ import pytest
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 from pytestqt.qtbot import QtBot
 
+from render.laser.laser import LineLaser
+from studio.project.mesh_import import ImportedMesh
 from studio.qt.core.session import Session
-from studio.qt.scene.mesh_importer import choose_mesh, choose_meshes, may_copy
+from studio.qt.scene.mesh_importer import choose_mesh, choose_meshes, colour_told, may_copy
 
 
 @pytest.fixture
@@ -66,3 +68,25 @@ def test_dialogs_begin_beside_the_project(session: Session, parent: QWidget, mon
     choose_meshes(session, parent)
     assert choose_mesh(session, parent) is None
     assert begun == [str(session.document.root)] * 2
+
+
+def test_the_colour_of_a_step_file_says_what_it_is_to_the_laser(session: Session) -> None:
+    """A red plate was nearly black to a blue laser, and nothing said why."""
+    lasers = session.project.scene.lasers
+    assert lasers[0].wavelength_nm == 450.0
+
+    def told(
+        *parts: tuple[str, tuple[float, float, float] | None], by: tuple[LineLaser, ...] = lasers
+    ) -> tuple[str, str]:
+        bounds = (0.0, 0.0, 0.0), (0.1, 0.1, 0.1)
+        return colour_told([ImportedMesh("a.ply", "mm", bounds, 12, name, colour, True) for name, colour in parts], by)
+
+    red, grey = ("plate", (0.6, 0.02, 0.03)), ("lid", (0.4, 0.4, 0.4))
+    level, text = told(red)
+    assert level == "warning" and "plate reflects 3% of the laser's light of 450 nm and is nearly black" in text
+    assert "the file has for the screen" in text and "Albedo changes it" in text
+    of_red = tuple(laser.model_copy(update={"wavelength_nm": 650.0}) for laser in lasers)
+    assert told(red, by=of_red) == ("info", told(red, by=of_red)[1]) and "60%" in told(red, by=of_red)[1]
+    assert told(grey)[0] == "info" and "lid reflects 40%" in told(grey)[1]
+    assert told(grey, red)[0] == "warning" and "plate" in told(grey, red)[1]
+    assert told(("bare", None)) == ("info", "")

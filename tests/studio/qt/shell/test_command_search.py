@@ -10,7 +10,7 @@ from pytestqt.qtbot import QtBot
 from analysis.gauges.gauge import TITLES
 from studio.qt.core.render import Render
 from studio.qt.forms.form import Section
-from studio.qt.shell.command_search import WORDS, CommandSearch
+from studio.qt.shell.command_search import NEAREST, WORDS, CommandSearch
 from studio.qt.shell.window import MainWindow
 from tests.studio.qt.small_session import small_project, small_render
 
@@ -147,3 +147,27 @@ def test_a_measure_is_added_from_the_search_once_there_is_a_profile(window: Main
     part = window.panels["results"].part  # type: ignore[attr-defined]
     qtbot.waitUntil(lambda: part.placing == "thickness")
     part.cancel()
+
+
+@pytest.mark.parametrize(
+    ("typed", "text"),
+    [
+        ("export photograph points", "File > Export > Line in photographs"),
+        ("save points", "File > Export > Points as PLY"),
+        ("tilt the laser", "Scene > Aim the laser at a click"),
+    ],
+)
+def test_a_command_is_found_by_what_is_to_be_done(window: MainWindow, qtbot: QtBot, typed: str, text: str) -> None:
+    search = CommandSearch(window)
+    qtbot.addWidget(search)
+    search.show_found(typed)
+    assert search.list.item(0).text().startswith(text)
+
+
+def test_where_nothing_has_all_words_the_nearest_are_offered(window: MainWindow, qtbot: QtBot) -> None:
+    search = CommandSearch(window)
+    qtbot.addWidget(search)
+    search.show_found("automatic expozure")
+    heading, first = search.list.item(0), search.list.item(1)
+    assert heading.text() == NEAREST and not heading.flags()
+    assert first.text().startswith("Render > Automatic exposure") and search.list.currentItem() is first
