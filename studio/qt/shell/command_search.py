@@ -39,7 +39,7 @@ WORDS = {
     "import_mesh": "CAD part model load",
     "expose": "brightness dark bright saturated",
     "scan": "conveyor turntable speed all frames",
-    "photographs": "real camera phone rectangle region",
+    "photographs": "open real camera phone rectangle region measure",
     **{f"export_{kind}": "save write points cloud" for kind in ("ply", "csv", "pcd", "xyz", "las", "e57")},
     "aim": "tilt turn rotate direct angle",
     "export_photographs": "export save photograph points table picture",
