@@ -105,14 +105,14 @@ def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Ta
         if take is not None and len(meshes) > 1:
             session.message.emit("error", f"an assembly of {len(meshes)} parts is not one mesh; import it instead")
             return
-        session.message.emit("info", _told(meshes, chord, wanted))
+        level, colours = "info", ""
         if take is None:
             _add(session, meshes)
-            level, text = colour_told(meshes, session.project.scene.lasers)
-            if text:
-                session.message.emit(level, text)
+            level, colours = colour_told(meshes, session.project.scene.lasers)
         else:
             take(meshes[0])
+        # one message, as the next would hide it
+        session.message.emit(level, ". ".join(filter(None, (_told(meshes, chord, wanted), colours))))
 
     def failed(file: Path, error: BaseException) -> None:
         what = trouble(error, f"import {file.name}")

@@ -88,9 +88,9 @@ def test_a_field_is_varied_before_the_study_workspace_was_seen(own_window: MainW
     path = ("scene", "rig", "lasers", 0, "power")
     spec = next(each for each in describe(own_window.session.project.scene.rig.lasers[0]) if each.name == "power")
     own_window.session.vary_asked.emit(path, spec)
-    assert [each["field"] for each in one_of(StudyWork, own_window.session).sweep["vary"]] == [
-        "scene.rig.lasers[0].power"
-    ]
+    work = one_of(StudyWork, own_window.session)
+    assert [each["field"] for each in work.sweep["vary"]] == ["scene.rig.lasers[0].power"]
+    work.as_it_came = work.draft  # so that the window closes unasked
 
 
 def test_another_workspace_is_a_sign_that_a_cell_of_a_study_is_no_longer_waited_for(
