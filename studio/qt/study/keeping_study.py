@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from render.base.errors import InputError
 from studio.qt.core.dialogs import ask_to_keep, ask_to_save_first
 from studio.qt.study.study_work import StudyWork
-from studio.study.draft import by_names
+from studio.study.draft import by_names, new_draft
 from studio.study.folder_run import in_window
 from studio.study.kept_draft import asks_something
 from studio.study.study_file import check_base, waits_for_project, write_study
@@ -55,11 +55,13 @@ def may_be_replaced(work: StudyWork, parent: QWidget) -> bool:
 def may_go(work: StudyWork, parent: QWidget, *, quits: bool) -> bool:
     """Whether the open project may be closed; asks where the study's changes go with it. quits: the window closes.
 
-    The study of a project that is a file is kept until that is opened again; another stays in the window as long as
-    it is of base projects of its own, or has begun.
+    The study of a project that is a file is kept until that is opened again, unless it is in a file of its own, which
+    nobody would look for it beside; another stays in the window as long as it is of base projects of its own, or has
+    begun.
     """
+    kept = work.kept_with_project and work.as_it_came == new_draft(work.base_name)
     stays = not quits and (work.loaded or work.running or work.found is not None)
-    return bool(work.kept_with_project or stays) or may_be_replaced(work, parent)
+    return bool(kept or stays) or may_be_replaced(work, parent)
 
 
 def _ask_where(parent: QWidget, suggestion: Path) -> Path | None:

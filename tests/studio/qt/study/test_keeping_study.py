@@ -83,6 +83,15 @@ class TestTheWindowCloses:
         desk.small([2.0, 20.0])
         assert may_quit(desk) and not asked
 
+    def test_one_that_is_in_a_file_of_its_own_is_asked_about(
+        self, desk: Desk, asked: list[str], tmp_path: Path
+    ) -> None:
+        """The file said two repeats, the study three, and nothing was asked."""
+        desk.small([2.0, 20.0])
+        assert save(desk.work, tmp_path / "noise.json") and may_quit(desk)
+        desk.work.change(lambda draft: draft.update(repeats=3))
+        assert not may_quit(desk) and len(asked) == 1
+
     def test_one_whose_results_hold_it_as_it_is_goes_unasked(
         self, qtbot: QtBot, unnamed: Desk, tmp_path: Path, asked: list[str]
     ) -> None:
