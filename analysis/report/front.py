@@ -27,7 +27,7 @@ from analysis.report.gauge_table import MARKS, counts_text
 from analysis.report.model import ReportInput
 from analysis.report.style import png_uri
 from analysis.report.total import total
-from analysis.report.units import count, degrees, micrometres, millimetres, milliwatts, percent
+from analysis.report.units import count, counted, degrees, micrometres, millimetres, milliwatts, percent
 from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float
 
@@ -37,6 +37,7 @@ VERDICTS = {
     "undecided": "Not decided within the uncertainty",
     "none": "No tolerance was given",
 }
+SURFACE = "the surface"
 DECIDED_BY = {"fail": "Out", "undecided": "Not decided"}
 FAR_AND_FALSE = (
     "A point is far off by its distance from the surface alone; a false scan line carries a point although no line "
@@ -68,7 +69,9 @@ def front(report: ReportInput) -> dict[str, Any] | None:
         "verdict": verdict,
         "verdict_text": VERDICTS[verdict],
         "judged": _judged(bool(surface["verdict"]), gauges, judged_objects(report), len(rows) > 0),
-        "decided_by": _decided_by(verdict, surface["verdict"], gauges, [_named(row) for row in report.measures]),
+        "decided_by": _decided_by(
+            verdict, [surface["verdict"], *gauges], [surface["name"], *(_named(row) for row in report.measures)]
+        ),
         "part_of": report.part_of,
         "rule": RULE if verdict != "none" else "",
         "surface": surface,
@@ -129,7 +132,7 @@ def _judged(surface: bool, gauges: list[str], objects: str, compared: bool) -> s
     """What the verdict is of: the surface, measures, and how many of these have a tolerance. compared: the report has
     the surface's deviation."""
     having = sum(bool(one) for one in gauges)
-    of = [f"the surface ({objects})"] if surface else []
+    of = [f"{SURFACE} ({objects})"] if surface else []
     if having:
         of.append(f"{count(having)} of {count(len(gauges))} measures" if len(gauges) > 1 else "the measure")
     if not of:
@@ -145,11 +148,11 @@ def _judged(surface: bool, gauges: list[str], objects: str, compared: bool) -> s
     return f"Of {' and '.join(of)}{rest}."
 
 
-def _decided_by(verdict: str, surface: str, gauges: list[str], names: list[str]) -> str:
+def _decided_by(verdict: str, each: list[str], names: list[str]) -> str:
     """What it is that is out, or is not decided; empty: nothing is."""
     if verdict not in DECIDED_BY:
         return ""
-    judged = zip(("the surface", *names), (surface, *gauges), strict=True)
+    judged = zip(names, each, strict=True)
     return f"{DECIDED_BY[verdict]}: {', '.join(name for name, one in judged if one == verdict)}."
 
 
@@ -158,7 +161,8 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
     told, value = report.delivery, -rows["off_surface"]
     if len(value) == 0:
         table = [("Objects", judged_objects(report)), ("Points", "none")]
-        return {"verdict": "undecided" if told.has_tolerance else "", "mark": "", "rows": table, "note": ""}
+        verdict = "undecided" if told.has_tolerance else ""
+        return {"verdict": verdict, "mark": "", "rows": table, "note": "", "name": SURFACE}
     far = far_off(value)
     kept = value[~far]
     table = [
@@ -170,7 +174,7 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
     ]
     note = FAR_AND_FALSE if far.any() and total(report.record.chosen()).false_rows else ""
     if not told.has_tolerance:
-        return {"verdict": "", "mark": "", "rows": table, "note": note}
+        return {"verdict": "", "mark": "", "rows": table, "note": note, "name": SURFACE}
     lower = -math.inf if told.lower is None else told.lower
     upper = math.inf if told.upper is None else told.upper
     judged = verdicts(rows["world"], value, _sigma(rows), lower, upper, _unsure(rows))
@@ -185,9 +189,11 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
         ("Proved inside (below)", percent(shares[BELOW], 2)),
     ]
     verdict = verdict_of(judged)
+    name = SURFACE
     if far.any() and (without := verdict_of(judged[~far])) != verdict:
         table.append(("Verdict without those far off", MARKS[without]))
-    return {"verdict": verdict, "mark": MARKS[verdict], "rows": table, "note": note}
+        name = f"{SURFACE} by its {counted(int(far.sum()), 'point')} far off alone"
+    return {"verdict": verdict, "mark": MARKS[verdict], "rows": table, "note": note, "name": name}
 
 
 def _unsure(rows: Any) -> NDArray[np.bool_]:

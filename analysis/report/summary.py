@@ -205,10 +205,12 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
             "put 95.4 %. Something else moves the line as well: texture or edges under it, or too few pixels."
         )
     if found.u.autocorrelation > 0.3:
+        cause = "the surface's texture or shape, or smoothing along the line"
+        if found.narrow > 0.1:
+            cause = "where within a pixel so thin a line falls, which neighbours have in common, or the surface"
         said.append(
-            f"Neighbouring scan lines err alike (correlation {found.u.autocorrelation:.2f}): the cause is rather the "
-            "surface's texture or shape, or smoothing along the line, than the sensor's noise, and averaging along it "
-            "gains little."
+            f"Neighbouring scan lines err alike (correlation {found.u.autocorrelation:.2f}): the cause is rather "
+            f"{cause}, than the sensor's noise, and averaging along it gains little."
         )
     if found.narrow > 0.1:
         said.append(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.line.extract import settings_of
+from analysis.line.result import Flag
 from render.base.errors import InputError
 from studio.photographs.evidence_words import CONTROLS
 from studio.photographs.photograph_set import Look, Wishes, look_at
@@ -49,6 +50,9 @@ class MeasuredSet:
         width = float(np.median(line.width[found, 0]))
         told = f"{found.sum()} of {count} {line.axis}, line {width:.2f} px wide (sigma)"
         told += f", position known to {sigma:.3f} px (1 sigma)"
+        clipped = int((line.flag[:, 0] == Flag.SATURATED).sum())
+        if clipped:
+            told += f", {clipped} of them saturated"
         if width < THINNEST:
             told += ", thinner than a lens draws a line: is it an edge?"
         return f"{told}; {line.note}" if line.note else told

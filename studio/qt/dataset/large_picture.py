@@ -22,6 +22,8 @@ from studio.runtime.jobs import Job, Progress
 
 LANE = "large picture"
 LINE = "#e69f00"
+FRAME = 80
+"""px that a window's title and edges take of the screen."""
 SMALL = "Small, as on the sheet; it is being made in its own size."
 
 
@@ -33,7 +35,8 @@ class LargePicture(QDialog):
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         what = "Image" if work.shows_written else "Scene"
         self.setWindowTitle(f"{what} {picture.number} of {work.name}")
-        self.resize(900, 700)
+        room = self.screen().availableGeometry()
+        self.resize(min(900, room.width() - FRAME), min(700, room.height() - FRAME))
         self.runner = JobRunner(self)
         self.view = PictureView()
         self.view.setBackground(theme.colours().base)

@@ -213,8 +213,9 @@ class ExportActions(QObject):
 
     def _tell(self, written: list[Path], of: str, notes: tuple[str, ...], known: Sequence[str]) -> None:
         """notes: what a file has not as was asked; known: what is so of what was asked, and no warning."""
-        names = ", ".join(str(path) for path in written) + of
-        self.session.message.emit("warning" if notes else "info", "\n".join([f"Wrote {names}", *notes, *known]))
+        # of a message of several lines the bar shows the first: it has the reason for its colour
+        first = ". ".join([f"Wrote {', '.join(str(path) for path in written)}{of}", *notes])
+        self.session.message.emit("warning" if notes else "info", "\n".join([first, *known]))
 
 
 def _is_there(what: str, render: Render) -> bool:

@@ -52,10 +52,17 @@ def shown(value: float, unit: str = "") -> str:
     return digits_of_percent(value) if unit == "%" else digits(value)
 
 
-def readable(name: str, unit: str, values: list[float]) -> tuple[str, str, list[float]]:
-    """A row as it is shown: in mm where a length has more than four digits in um."""
-    shown_in, factor = readable_unit(unit, max((abs(value) for value in values if math.isfinite(value)), default=0.0))
-    return name, shown_in, [factor * value for value in values]
+def readable(rows: list[tuple[str, str, list[float]]]) -> list[tuple[str, str, list[float]]]:
+    """Rows as they are shown: all lengths in mm where one of them has more than four digits in um."""
+    largest: dict[str, float] = {}
+    for _, unit, values in rows:
+        finite = (abs(value) for value in values if math.isfinite(value))
+        largest[unit] = max((largest.get(unit, 0.0), *finite))
+    made = []
+    for name, unit, values in rows:
+        shown_in, factor = readable_unit(unit, largest[unit])
+        made.append((name, shown_in, [factor * value for value in values]))
+    return made
 
 
 class ReadOnlyTable(QTableWidget):
@@ -107,7 +114,7 @@ class MeasuresTable(ReadOnlyTable):
     def show_measures(self, methods: list[str], rows: list[tuple[str, str, list[float]]]) -> None:
         """rows: name, unit, and a value for each method, NaN where there is none."""
         self.show_methods(methods, len(rows))
-        for row, (name, unit, values) in enumerate(readable(*one) for one in rows):
+        for row, (name, unit, values) in enumerate(readable(rows)):
             heading = QTableWidgetItem(f"{name} / {unit}" if unit else name)
             heading.setToolTip(f"<p>{EXPLAINED[name]}</p>")
             self.setVerticalHeaderItem(row, heading)

@@ -15,6 +15,8 @@ from studio.qt.core.session import Session
 from studio.qt.core.widgets import ShareBar
 from studio.runtime.jobs import Job, State
 
+AS_IT_WAS = "The value is as it was"
+"""How a refusal ends that was given up."""
 SHORT = 0.4
 """Seconds; work that ends sooner is not worth a progress bar."""
 WIDEST, MARGIN = 720, 6
@@ -65,6 +67,7 @@ class StatusBar(QStatusBar):
         if parent is not None:
             parent.installEventFilter(self)
         session.message.connect(self.show_text)
+        session.project_changed.connect(self._drop_refusal)
         runner.progress.connect(self.follow)
         for signal in (runner.finished, runner.failed, runner.cancelled):
             signal.connect(self._end)
@@ -117,6 +120,11 @@ class StatusBar(QStatusBar):
         """A message, for a while; a click on it opens the log."""
         self._say(text, level if level in ("warning", "error") else "message")
         self._fade.start(1000 * MESSAGE_SECONDS.get(level, 8))
+
+    def _drop_refusal(self) -> None:
+        """A value was taken: that one before it was not is no longer what counts."""
+        if AS_IT_WAS in self.whole.text():
+            self._say("", "message")
 
     def drop_tip(self) -> None:
         """What the mouse rests on is no longer what is spoken of: a key has brought another workspace."""

@@ -168,6 +168,8 @@ def test_the_mean_deviation_is_of_the_surface_and_far_off_are_counted() -> None:
     assert abs(float(told_of[3][1].split()[0])) < 1e6 * 0.05 / len(rows)
     decided = _surface(handed(customer="Ada", lower=-0.04, upper=0.04), false)
     assert decided["verdict"] == "fail" and decided["rows"][-1] == ("Verdict without those far off", MARKS["pass"])
+    assert decided["name"] == "the surface by its 3 points far off alone", "the headline does not blame the part"
+    assert _surface(handed(customer="Ada", lower=-0.04, upper=0.04), rows)["name"] == "the surface"
 
 
 def test_the_triangulation_angle_is_that_at_the_part() -> None:

@@ -284,14 +284,14 @@ def test_remarks_name_what_is_wrong():
 
     curve = frame.lasers[0].curve
     assert "bias" in said(extraction(scene, curve, 0, "likelihood", noise + 0.2))
-    assert "err alike" in said(extraction(scene, curve, 0, "likelihood", 0.15 * np.sin(np.arange(100) / 8)))
+    alike = extraction(scene, curve, 0, "likelihood", 0.15 * np.sin(np.arange(100) / 8))
     assert "predicted sigma" in said(extraction(scene, curve, 0, "likelihood", 2.5 * noise))
-    assert "10 scan lines" in said(
-        extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 10, np.nan, noise))
-    ).replace("\u202f", "")
+    some = extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 10, np.nan, noise))
+    assert "10 scan lines" in said(some).replace("\u202f", "")
     assert "outliers" in said(extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 3, 9.0, noise)))
-    narrow = dataclasses.replace(first.line, width=0.3 * np.ones_like(first.line.width))
-    assert "narrower" in said(dataclasses.replace(first, line=narrow))
+    for width, causes in ((2.0, ("err alike", "surface's texture")), (0.3, ("narrower", "so thin a line"))):
+        line = dataclasses.replace(first.line, width=width * np.ones_like(first.line.width))
+        assert all(cause in said(dataclasses.replace(alike, line=line)) for cause in causes)
     bent = dataclasses.replace(first.errors, sheet_bias=np.where(np.arange(100) < 50, 0.04, np.nan))
     assert "own width moves the line by 0.04" in said(dataclasses.replace(first, errors=bent))
     lost = extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 60, np.nan, noise))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
 from PySide6.QtWidgets import QApplication
 
+from analysis.line.result import Flag
 from render.sensor.develop import develop
 from studio.qt.image.photograph_window import LANE, PICTURE, RENDERED, PhotographWindow
 from studio.qt.image.zooms import Zooms
@@ -56,6 +58,18 @@ def test_the_line_of_each_is_drawn_where_it_is_and_told_with_what_was_chosen(qtb
     assert "laser's colour: red" in made.chosen.text()
     qtbot.waitUntil(lambda: made.runner.job(PICTURE) is None)
     assert made.view.item.size == photograph(SCENE, seed=1).shape[1::-1]
+
+
+def test_how_much_of_a_line_is_saturated_is_told(qtbot, made):
+    """All of it was, and only the colour that it was drawn in said so."""
+    measured(qtbot, made)
+    assert "saturated" not in made.told.text()
+    found = made.found
+    for path, one in found.lines.items():
+        flag = one.line.flag.copy()
+        flag[:7, 0] = Flag.SATURATED
+        found.lines[path] = replace(one, line=replace(one.line, flag=flag))
+        assert ", 7 of them saturated" in found.told_of(path)
 
 
 def test_it_says_what_to_do_next_and_then_whose_width_and_whose_sigma_the_figures_are(qtbot, made, tmp_path):

@@ -166,14 +166,14 @@ def test_results_explain_what_lies_within_two_sigma(qtbot: QtBot) -> None:
 
 
 def test_large_errors_are_told_in_mm(qtbot: QtBot) -> None:
-    """An RMSE of 0.8 m stood there as 789531 um."""
+    """An RMSE of 0.8 m stood there as 789531 um; and a bias in mm above what it is known to in um."""
     made = MeasuresTable()
     qtbot.addWidget(made)
     made.show_measures(
         ["likelihood"], [("RMSE", "µm", [789531.0]), ("Bias", "µm", [-9999.0]), ("Points", "", [20000.0])]
     )
     told = {made.verticalHeaderItem(i).text(): made.item(i, 0).text() for i in range(3)}
-    assert told == {"RMSE / mm": "790", "Bias / µm": "-9\u202f999", "Points": "20\u202f000"}
+    assert told == {"RMSE / mm": "790", "Bias / mm": "-10.00", "Points": "20\u202f000"}
 
 
 def test_the_words_of_outliers_say_which_completeness_counts(qtbot: QtBot) -> None:

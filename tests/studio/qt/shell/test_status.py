@@ -44,6 +44,17 @@ def test_what_is_said_after_a_tip_is_read_and_no_tip_hides_a_warning(window: Mai
     assert window.status.text.text() == "Pause"
 
 
+def test_a_refusal_goes_with_the_next_value_that_is_taken(window: MainWindow) -> None:
+    """It stood there for twenty seconds beside a power that had been accepted."""
+    window.session.message.emit("warning", "Power: must be at most 10 000 000 mW. The value is as it was")
+    assert "as it was" in window.status.text.text()
+    window.session.set(("scene", "rig", "lasers", 0, "power"), 0.003, "change power")
+    assert not window.status.text.text()
+    window.session.message.emit("warning", "A frame is being rendered.")
+    window.session.set(("scene", "rig", "lasers", 0, "power"), 0.004, "change power")
+    assert window.status.text.text() == "A frame is being rendered."
+
+
 def test_a_tip_goes_when_another_workspace_comes(window: MainWindow) -> None:
     """The mouse rests on the toolbar's Measure, and F12 brings Study."""
     show_tip(window, "Measure")
