@@ -105,14 +105,15 @@ def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Ta
         if take is not None and len(meshes) > 1:
             session.message.emit("error", f"an assembly of {len(meshes)} parts is not one mesh; import it instead")
             return
-        level, colours = "info", ""
-        if take is None:
-            _add(session, meshes)
-            level, colours = colour_told(meshes, session.project.scene.lasers)
-        else:
+        told = _told(meshes, chord, wanted)
+        if take is not None:
+            session.message.emit("info", told)
             take(meshes[0])
+            return
+        _add(session, meshes)
+        level, colours = colour_told(meshes, session.project.scene.lasers)
         # one message, as the next would hide it
-        session.message.emit(level, ". ".join(filter(None, (_told(meshes, chord, wanted), colours))))
+        session.message.emit(level, ". ".join(filter(None, (told, colours))))
 
     def failed(file: Path, error: BaseException) -> None:
         what = trouble(error, f"import {file.name}")
