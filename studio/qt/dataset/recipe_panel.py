@@ -34,6 +34,9 @@ from studio.runtime.jobs import Job
 
 ALL_THERE = "; a higher number of scenes makes more"
 NOTHING_DRAWN = "Nothing is drawn yet, and all scenes are alike: add what is to be drawn of the project."
+SIZE_TIP = (
+    "Of the project's own width and height; exposures are shortened as pixels get larger, so that images stay as bright"
+)
 FILES = "Recipes (*.json);;All files (*)"
 
 
@@ -61,6 +64,8 @@ class RecipePanel(QWidget):
         self.scenes.setToolTip("Each is rendered once")
         self.images = WholeBox(minimum=1, maximum=MOST_VARIANTS)
         self.images.setToolTip("Photographs of each scene: they share its light and draw the sensor anew")
+        self.image_size = WholeBox(minimum=1, maximum=400, suffix=" %")
+        self.image_size.setToolTip(SIZE_TIP)
         self.seed = WholeBox(minimum=0, maximum=2**31 - 1)
         self.seed.setToolTip("Decides every scene and every image")
         self.told = QLabel(wordWrap=True)
@@ -75,7 +80,8 @@ class RecipePanel(QWidget):
         recipe = self.work.recipe
         self.name.setText(recipe.name)
         self.about.setText(recipe.about or ("" if recipe.draw else NOTHING_DRAWN))
-        for box, value in ((self.images, recipe.images), (self.seed, recipe.seed)):
+        size = round(100.0 * recipe.image_scale)
+        for box, value in ((self.images, recipe.images), (self.image_size, size), (self.seed, recipe.seed)):
             box.blockSignals(True)
             box.setValue(min(value, box.maximum()))
             box.blockSignals(False)
@@ -146,10 +152,11 @@ class RecipePanel(QWidget):
 
     def _connect(self) -> None:
         work = self.work
-        for box in (self.scenes, self.images, self.seed):
+        for box in (self.scenes, self.images, self.image_size, self.seed):
             box.setKeyboardTracking(False)
         self.scenes.valueChanged.connect(work.choose_count)
         self.images.valueChanged.connect(lambda count: work.set_recipe(images=count))
+        self.image_size.valueChanged.connect(lambda percent: work.set_recipe(image_scale=percent / 100.0))
         self.seed.valueChanged.connect(lambda seed: work.set_recipe(seed=seed))
         self.foot.choose.clicked.connect(lambda: self.ask_folder())
         self.foot.run.clicked.connect(self.ask_and_run)
@@ -174,7 +181,7 @@ class RecipePanel(QWidget):
         self.foot.show_state(work.folder, work.job, begun=there > 0)
         self.foot.run.setEnabled(not whole)
         self.foot.run.setToolTip(f"Every image is there{ALL_THERE}" if whole else "")
-        for widget in (self.files, self.scenes, self.images, self.seed, *self.rows):
+        for widget in (self.files, self.scenes, self.images, self.image_size, self.seed, *self.rows):
             widget.setEnabled(not work.running)
         self.add.setEnabled(not work.running and work.base is not None)
 
@@ -193,6 +200,7 @@ class RecipePanel(QWidget):
         counts = QFormLayout()
         counts.addRow("Scenes", self.scenes)
         counts.addRow("Images of each", self.images)
+        counts.addRow("Size of images", self.image_size)
         counts.addRow("Seed", self.seed)
         foot = QVBoxLayout()
         foot.setContentsMargins(8, 4, 8, 8)

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 from render.base.errors import InputError
 from studio.qt.core import theme
 from studio.qt.core.delete_key import DeleteKey
-from studio.qt.core.dialogs import ask_removal, show_trouble
+from studio.qt.core.dialogs import ask_removal, ask_to_save_first, show_trouble
 from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.render import Render
 from studio.qt.core.session import Session
@@ -46,6 +46,8 @@ NAMING = "A name keeps no settings: a render is developed as the project is then
 KEEPING = "Its light, its settings and its figures as they are read now are kept, whatever the project becomes."
 GOING = "Kept nowhere: it goes when the project is closed, saved or not."
 CLOSING = "Out of this session's renders; it stays kept with the project."
+
+KEPT_BESIDE = "A kept render lies in the folder of its project, and this project is in no file yet."
 
 
 class _ThreeLines(QStyledItemDelegate):
@@ -207,7 +209,14 @@ class History(QWidget):
         return table
 
     def keep(self, render: Render) -> None:
-        """With the project, by its name."""
+        """With the project, by its name; one that is in no file yet is offered to be saved first."""
+        session = self.session
+        if session.document.path is None:
+            if not ask_to_save_first(self.window(), session.project.name, KEPT_BESIDE):
+                return
+            session.save_asked.emit()
+            if session.document.path is None:
+                return  # nobody said where
         try:
             keep_render(self.session, render, title(render))
         except InputError as error:

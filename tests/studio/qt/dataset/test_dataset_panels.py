@@ -231,6 +231,16 @@ def test_a_saved_recipe_is_what_was_shown(desk: Desk, tmp_path: Path) -> None:
     assert (desk.work.recipe.images, desk.work.recipe.draw[0].high) == (5, 0.2)
 
 
+def test_the_size_of_the_images_is_chosen_and_told(desk: Desk) -> None:
+    """There was no field for it, and images came at half of the scanner's size."""
+    before = desk.panel.told.text()
+    desk.panel.image_size.setValue(10)
+    assert desk.work.recipe.image_scale == 0.1
+    assert desk.panel.told.text() != before and " px" in desk.panel.told.text()
+    desk.work.set_recipe(image_scale=0.5)
+    assert desk.panel.image_size.value() == 50
+
+
 def test_a_recipe_or_a_study_never_replaces_a_project(desk: Desk, tmp_path: Path) -> None:
     """Groove the recipe and groove the project had one name in one folder, and the project was gone."""
     file = tmp_path / "groove.json"

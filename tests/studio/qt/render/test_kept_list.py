@@ -169,6 +169,24 @@ def test_one_that_is_kept_nowhere_says_so_and_is_kept_by_a_click(qtbot: QtBot, t
     assert not history.keep_button.isEnabled(), "the program's own first picture is no work of a person"
 
 
+def test_a_project_that_is_in_no_file_is_offered_to_be_saved_before_a_render_is_kept(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was refused, with an OK to press."""
+    world, frame = small_render()
+    session = Session(Document(small_project(), root=tmp_path))
+    history, asked = list_of(qtbot, session), []
+    session.add_render(Render(1, session.project, world, frame))
+    session.save_asked.connect(lambda: session.document.save(tmp_path / "mine.json"))
+    for answer in (False, True):
+        monkeypatch.setattr(
+            history_module, "ask_to_save_first", lambda *told, answer=answer: asked.append(told) or answer
+        )
+        history.keep(session.renders[0])
+        assert (session.renders[0].kept is not None) == answer
+    assert len(asked) == 2 and session.document.path == tmp_path / "mine.json"
+
+
 def test_a_kept_render_goes_from_the_disk_only_when_it_is_confirmed(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
