@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 SCENES, COLUMNS = 64, 8
 SIDE = 200
 """px of the longer side of one picture."""
+LINE = "#e69f00"
+"""Colour of the exact lines."""
 
 
 @dataclass(frozen=True)
@@ -120,5 +122,5 @@ def _draw(axes: Axes, picture: Picture) -> None:
     for curve in picture.curves:
         pair = (curve.position, curve.index) if curve.axis == "rows" else (curve.index, curve.position)
         upper = slice(0, len(curve.index) // 2)  # the other half shows the line itself
-        axes.plot(pair[0][upper], pair[1][upper], ".", markersize=0.6, color="#e69f00")
+        axes.plot(pair[0][upper], pair[1][upper], ".", markersize=0.6, color=LINE)
     axes.set_title(f"{picture.number}", fontsize=6, pad=1)

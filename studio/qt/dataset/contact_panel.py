@@ -8,14 +8,13 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QHelpEvent, QHideEvent, QImage, QMouseEvent, QPainter, QPaintEvent, QShowEvent
 from PySide6.QtWidgets import QLabel, QSizePolicy, QToolTip, QVBoxLayout, QWidget
 
-from studio.dataset.contact_sheet import Picture
+from studio.dataset.contact_sheet import LINE, Picture
 from studio.qt.core.boxes import ChoiceBox
 from studio.qt.core.session import Session, one_of
 from studio.qt.dataset.dataset_work import DatasetWork
 from studio.qt.dataset.large_picture import LargePicture
 
 GAP = 6
-LINE = QColor("#e69f00")
 LINE_WIDTH = 1.5
 SIMPLER = "So small, gloss and curves are rougher than in the images: a double click shows one as it will be."
 
@@ -165,7 +164,7 @@ def _paint(painter: QPainter, place: QRectF, picture: Picture) -> None:
     painter.translate(place.topLeft())
     painter.scale(place.width() / width, place.height() / height)
     pen = painter.pen()
-    pen.setColor(LINE)
+    pen.setColor(QColor(LINE))
     pen.setWidthF(LINE_WIDTH)
     pen.setCosmetic(True)
     painter.setPen(pen)

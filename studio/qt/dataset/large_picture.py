@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QCheckBox, QDialog, QHBoxLayout, QLabel, QVBoxLayo
 from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.output.tone_mapping import pyramid
-from studio.dataset.contact_sheet import Picture, large_picture
+from studio.dataset.contact_sheet import LINE, Picture, large_picture
 from studio.dataset.written import written_picture
 from studio.qt.core import theme
 from studio.qt.core.jobs import JobRunner
@@ -21,7 +21,6 @@ from studio.qt.image.zooms import Zooms
 from studio.runtime.jobs import Job, Progress
 
 LANE = "large picture"
-LINE = "#e69f00"
 FRAME = 80
 """px that a window's title and edges take of the screen."""
 SMALL = "Small, as on the sheet; it is being made in its own size."

@@ -23,9 +23,10 @@ from PySide6.QtWidgets import (
 from render.base.errors import InputError
 from studio.qt.core import theme
 from studio.qt.core.delete_key import DeleteKey
-from studio.qt.core.dialogs import ask_removal, ask_to_save_first, show_trouble
+from studio.qt.core.dialogs import ask_removal, show_trouble
 from studio.qt.core.menu_tips import show_tips
 from studio.qt.core.render import Render
+from studio.qt.core.save_first import saved_first
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import text_button
 from studio.qt.image.compare_view import CompareView
@@ -211,14 +212,10 @@ class History(QWidget):
     def keep(self, render: Render) -> None:
         """With the project, by its name; one that is in no file yet is offered to be saved first."""
         session = self.session
-        if session.document.path is None:
-            if not ask_to_save_first(self.window(), session.project.name, KEPT_BESIDE):
-                return
-            session.save_asked.emit()
-            if session.document.path is None:
-                return  # nobody said where
+        if not saved_first(session, self, KEPT_BESIDE, lambda: session.document.path is not None):
+            return
         try:
-            keep_render(self.session, render, title(render))
+            keep_render(session, render, title(render))
         except InputError as error:
             show_trouble(self.window(), trouble(error, "keep the render"))
         self._read_kept()

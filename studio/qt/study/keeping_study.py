@@ -7,7 +7,8 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from render.base.errors import InputError
-from studio.qt.core.dialogs import ask_to_keep, ask_to_save_first
+from studio.qt.core.dialogs import ask_to_keep
+from studio.qt.core.save_first import saved_first
 from studio.qt.study.study_work import StudyWork
 from studio.study.draft import by_names, new_draft
 from studio.study.folder_run import in_window
@@ -99,12 +100,10 @@ def _may_be_saved(work: StudyWork, parent: QWidget) -> bool:
     session = work.session
     try:
         base = work.study().base
-        if waits_for_project(base, session.document, work.loaded):
-            if not ask_to_save_first(parent.window(), session.project.name, NAMES_PROJECT):
-                return False
-            session.save_asked.emit()
-            if waits_for_project(base, session.document, work.loaded):
-                return False  # nobody said where
+        if not saved_first(
+            session, parent, NAMES_PROJECT, lambda: not waits_for_project(base, session.document, work.loaded)
+        ):
+            return False
         check_base(base, session.document, work.loaded)
     except InputError as error:
         session.message.emit("warning", f"The study cannot be saved: {by_names(in_window(error), work.draft)}")

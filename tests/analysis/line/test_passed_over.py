@@ -62,7 +62,7 @@ def test_a_line_fainter_than_what_is_lit_beside_it_is_found(name, noise):
 @pytest.mark.parametrize("noise", [NOISE, None], ids=["noise known", "noise estimated"])
 @pytest.mark.parametrize("name", GROUNDS)
 def test_bumps_of_what_is_lit_are_no_lines(name, noise, monkeypatch):
-    """Two scan lines of 1500 in the worst of eight images, beside those whose edge is taken for a line by its fit."""
+    """One scan line of 1500 in the worst of eight images, beside those whose edge is taken for a line by its fit."""
     passed, _ = extracted(GROUNDS[name], 0.0, noise)
     monkeypatch.setattr(measure, "pass_over", lambda *_: None)
     alone, _ = extracted(GROUNDS[name], 0.0, noise)

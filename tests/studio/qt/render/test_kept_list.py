@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 from render.output import frame_files
 from studio.project.document import Document
 from studio.project.project import Project
+from studio.qt.core import save_first
 from studio.qt.core.render import Render
 from studio.qt.core.session import Session
 from studio.qt.render import history as history_module
@@ -179,9 +180,7 @@ def test_a_project_that_is_in_no_file_is_offered_to_be_saved_before_a_render_is_
     session.add_render(Render(1, session.project, world, frame))
     session.save_asked.connect(lambda: session.document.save(tmp_path / "mine.json"))
     for answer in (False, True):
-        monkeypatch.setattr(
-            history_module, "ask_to_save_first", lambda *told, answer=answer: asked.append(told) or answer
-        )
+        monkeypatch.setattr(save_first, "ask_to_save_first", lambda *told, answer=answer: asked.append(told) or answer)
         history.keep(session.renders[0])
         assert (session.renders[0].kept is not None) == answer
     assert len(asked) == 2 and session.document.path == tmp_path / "mine.json"

@@ -252,7 +252,7 @@ def test_a_panel_that_needs_a_file_of_the_project_has_it_saved(
     work = study.work  # type: ignore[attr-defined]
     work.start_anew()
     work.vary(("sensor", "read_noise"), spec_of(window.session.project, "sensor.read_noise"))
-    monkeypatch.setattr("studio.qt.study.keeping_study.ask_to_save_first", lambda *_: True)
+    monkeypatch.setattr("studio.qt.core.save_first.ask_to_save_first", lambda *_: True)
     paths = iter((tmp_path / "mine.json", tmp_path / "noise.json"))
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(next(paths)), ""))
     study._save()  # type: ignore[attr-defined]

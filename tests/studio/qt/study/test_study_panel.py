@@ -212,7 +212,7 @@ class TestDraft:
             return saves
 
         monkeypatch.setattr("studio.qt.study.study_panel.QFileDialog.getSaveFileName", where)
-        monkeypatch.setattr("studio.qt.study.keeping_study.ask_to_save_first", first)
+        monkeypatch.setattr("studio.qt.core.save_first.ask_to_save_first", first)
         document = desk.session.document
         desk.session.save_asked.connect(lambda: document.save(tmp_path / "plane.json"))
         desk.small([2.0, 20.0])
