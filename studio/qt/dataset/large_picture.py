@@ -36,6 +36,7 @@ class LargePicture(QDialog):
         self.setWindowTitle(f"{what} {picture.number} of {work.name}")
         room = self.screen().availableGeometry()
         self.resize(min(900, room.width() - FRAME), min(700, room.height() - FRAME))
+        self.move(room.center() - self.rect().center())  # over the sheet its title would be off the screen
         self.runner = JobRunner(self)
         self.view = PictureView()
         self.view.setBackground(theme.colours().base)
