@@ -119,7 +119,7 @@ def fitted(
     start = np.array([1.0, (sensor.blur_sigma / pitch) ** 2, sensor.halo, sensor.halo_sigma / pitch])
     raw = sensor.processing is None
     shape = twin_profile.fit_shape(parts, start, raw, None if like is None else like.shape)
-    found = twin_noise.transfer(seen, shape.values, None if departed is None else departed.edges)
+    found = twin_noise.transfer(seen, shape.best, None if departed is None else departed.edges)
     noise = None
     if found is not None and not rough:
         usual = found
@@ -163,7 +163,7 @@ def _told(
     return Twin(
         Told(scale, scale_sigma),
         Told(scale * usual, scale_sigma * usual),
-        Told(line, scale * usual**2 * scale_sigma / line),
+        Told(line, shape.line / (2.0 * line)),
         Told(blur, 0.0 if apart else float(0.5 * sigma[1] / max(blur, 1e-3)), apart),
         Told(float(p[2]), float(sigma[2]), haloed),
         Told(float(p[3]) if shape.haloed else sensor.halo_sigma / pitch, float(sigma[3]), haloed),
@@ -215,17 +215,15 @@ def by_rehearsal(project: Project, seen: Seen, numbers: Numbers, rehearse: Rehea
     last = fitted(project, seen, numbers, departed)
     again = [fitted(project, one, numbers, departed, last).twin for one in takes]
     twin = _with_scatter(last.twin, again, sum(one.count for one in takes) / (TAKES * seen.count))
-    line, unsure = twin.line_px.value, last.shape.unsure
+    line = twin.line_px.value
     # of the line's variance, by the model; what of it is the blur's is as unsure in px^2
     model = MODEL * line**2
     return replace(
         twin,
         scale=_less_sure(twin.scale, MODEL * twin.scale.value),
         sheet_px=_less_sure(twin.sheet_px, MODEL * twin.sheet_px.value),
-        line_px=_less_sure(twin.line_px, math.hypot(MODEL * line, unsure[0] / (2.0 * line))),
+        line_px=_less_sure(twin.line_px, MODEL * line),
         blur_px=_less_sure(twin.blur_px, model / max(twin.blur_px.value, 1e-3)),
-        halo=_less_sure(twin.halo, unsure[1]),
-        halo_px=_less_sure(twin.halo_px, unsure[2]),
     )
 
 

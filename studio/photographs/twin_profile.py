@@ -19,8 +19,6 @@ from studio.photographs.twin_seen import HALF, ROWS, Seen
 
 STRETCHES = 8
 """By the sheet's width, at most."""
-BLURS = 0.0, 0.6
-"""Shares of the line's variance between which that of a blur that is not told is taken to be."""
 EDGES = 0.02, 0.98
 """Quantiles of the sheet's width between which it is cut evenly."""
 WIDEST = 1e4
@@ -55,9 +53,10 @@ class Shape:
     sigmas: Float
     apart: bool
     haloed: bool
-    unsure: Float
-    """(3,) sigma of the line's variance, px^2, of halo and of halo px by a blur that is not told: a blur that acts on
-    pixels has heavier tails than the sheet."""
+    best: Float
+    """(4,) as fitted, before the blur was put back to the project's."""
+    line: float
+    """Sigma of the line's variance, px^2, sheet and blur together."""
 
 
 def parts_of(seen: Seen) -> list[Part]:
@@ -133,7 +132,7 @@ def fit_shape(parts: list[Part], start: Float, halo: bool, like: Shape | None = 
     low[3] = low[3] if halo else 1e-6
     start = np.clip(start, low + 1e-9, high)
 
-    def solved(free: list[int]) -> tuple[Float, Float]:
+    def solved(free: list[int]) -> tuple[Float, Float, Float]:
         def some(q: Float) -> Float:
             p = start.copy()
             p[free] = q
@@ -144,39 +143,27 @@ def fit_shape(parts: list[Part], start: Float, halo: bool, like: Shape | None = 
         covariance = np.linalg.pinv(done.jac.T @ done.jac) * max(excess, 1.0)
         p, sigma = start.copy(), np.zeros(4)
         p[free], sigma[free] = done.x, np.sqrt(np.diag(covariance))
-        return p, sigma
+        return p, sigma, covariance
 
-    if like is None:
-        p, sigma = solved([0, 1, 2, 3] if halo else [0, 1])
-        haloed = halo and p[2] > SURE * sigma[2] and sigma[3] < 0.5 * p[3] and p[3] > 1.05 * narrowest
-        sheets = [one.sheet for one in parts]
-        varied = float(np.ptp(sheets)) > VARIED * float(np.mean(sheets))
-        apart = varied and sigma[0] < 2.0 * TOLD * p[0] and sigma[1] < 2.0 * TOLD * max(p[1], 0.25)
-        done = apart and haloed == halo
-        if not done and halo:
-            start[2:] = (p[2], p[3]) if haloed else (0.0, start[3])
-    else:
-        apart, haloed, done = like.apart, like.haloed, False
-        start = np.where([True, apart, haloed, haloed], like.values, start)
-        if halo and not haloed:
-            start[2] = 0.0
-    if not done:
-        p, sigma = solved(([0, 1] if apart else [0]) + ([2, 3] if haloed else []))
-    if haloed and like is None and p[3] < 1.05 * narrowest:  # by a blur that is not the project's, the line itself
+    haloed = halo if like is None else like.haloed
+    if not haloed and halo:
+        start[2] = 0.0
+    p, sigma, covariance = solved([0, 1, 2, 3] if haloed else [0, 1])
+    if like is None and haloed and not (p[2] > SURE * sigma[2] and sigma[3] < 0.5 * p[3] and p[3] > 1.05 * low[3]):
         haloed, start[2] = False, 0.0
-        p, sigma = solved([0, 1] if apart else [0])
+        p, sigma, covariance = solved([0, 1])
+    sheets = np.array([one.sheet for one in parts])
+    varied = float(np.ptp(sheets)) > VARIED * float(np.mean(sheets))
+    apart = varied and sigma[0] < 2.0 * TOLD * p[0] and sigma[1] < 2.0 * TOLD * max(p[1], 0.25)
+    apart = bool(apart) if like is None else like.apart
+    sheet, best = float(np.mean(sheets)), p.copy()
+    spread = float(np.sqrt(max(np.array([sheet, 1.0]) @ covariance[:2, :2] @ np.array([sheet, 1.0]), 0.0)))
+    if not apart:
+        # the line's variance is told by its shape however it is shared; the sheet takes what the blur leaves
+        p[0], p[1] = (p[0] * sheet + p[1] - start[1]) / sheet, start[1]
+        sigma[0], sigma[1] = spread / sheet, 0.0
     _check(p, sigma, float(np.sqrt(start[1])))
-    unsure = np.zeros(3)
-    if not apart and like is None:
-        sheet = float(np.mean([one.sheet for one in parts]))
-        line = p[0] * sheet + p[1]
-        found = []
-        for blur in BLURS:
-            start[1] = blur * line
-            other, _ = solved([0, *([2, 3] if haloed else [])])
-            found.append(np.array([other[0] * sheet + start[1], other[2], other[3]]))
-        unsure = np.ptp(found, axis=0) / 12.0**0.5
-    return Shape(p, sigma, apart, haloed, unsure)
+    return Shape(p, sigma, apart, haloed, best, spread)
 
 
 def _check(p: Float, sigma: Float, blur: float) -> None:

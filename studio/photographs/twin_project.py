@@ -18,6 +18,7 @@ from render.scene.scene import Scene
 from render.sensor.sensor import Sensor
 from render.truth.laser_curve import laser_curve
 from render.world.world import build_world
+from studio.photographs.evidence import COLOURS
 from studio.photographs.photograph_set import Wishes, look_at
 from studio.photographs.photographs import Measured, check_size, extract_photograph, naming
 from studio.photographs.rehearsal import Stage, ground_of, rehearsed
@@ -180,7 +181,7 @@ def wider(laser: LineLaser, scale: float) -> LineLaser:
 
 def _with_power(project: Project, root: Path, laser: int, twin: Twin, threads: int | None) -> tuple[Project, Told]:
     """The project whose line is as bright as the photographs': power times reflectance is all that they show."""
-    light = inspect(project, root, threads).lasers[laser].light_electrons
+    light = inspect(_of_one_colour(project, laser), root, threads).lasers[laser].light_electrons
     lasers = list(project.scene.lasers)
     power = lasers[laser].power
     if not light or twin.peak.value <= 0.0:
@@ -188,6 +189,17 @@ def _with_power(project: Project, root: Path, laser: int, twin: Twin, threads: i
     scaled = power * twin.peak.value / light
     lasers[laser] = LineLaser.model_validate({**lasers[laser].model_dump(), "power": scaled})
     return _with_lasers(project, tuple(lasers)), Told(scaled, scaled * twin.peak.sigma / twin.peak.value)
+
+
+def _of_one_colour(project: Project, laser: int) -> Project:
+    """The project with a sensor that has the colour everywhere that is measured, which a mosaic has not on each row."""
+    channel = numbers_of(project, laser).channel
+    if channel == "mono":
+        return project
+    curve = project.sensor.efficiency[COLOURS.index(channel)]
+    return project.model_copy(
+        update={"sensor": project.sensor.model_copy(update={"colour": "mono", "efficiency": (curve,)})}
+    )
 
 
 def _with_lasers(project: Project, lasers: tuple[LineLaser, ...]) -> Project:
