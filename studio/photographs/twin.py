@@ -224,6 +224,9 @@ def by_rehearsal(project: Project, seen: Seen, numbers: Numbers, rehearse: Rehea
         sheet_px=_less_sure(twin.sheet_px, MODEL * twin.sheet_px.value),
         line_px=_less_sure(twin.line_px, MODEL * line),
         blur_px=_less_sure(twin.blur_px, model / max(twin.blur_px.value, 1e-3)),
+        # as much of the light may be taken for the line's in place of the halo's
+        halo=_less_sure(twin.halo, MODEL),
+        halo_px=_less_sure(twin.halo_px, MODEL / max(twin.halo.value, MODEL) * twin.halo_px.value),
     )
 
 
