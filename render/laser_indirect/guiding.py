@@ -290,16 +290,27 @@ def update_guide_rows(wave_moments: Float, guide_moments: Float, cumulative: Flo
 def draw_camera_paths(camera_paths: Float, active: Int, keys: Int, seed: int) -> DrawnPaths:
     """The camera paths of a pass, where some pixels, each with a key or none, may have any.
 
-    Their expected number is rounded up or down at random, so that its mean is kept; alike where keys are the same.
+    Their expected number is rounded up or down at random, so that its mean is kept: alike where pixels share a key, one
+    above their own numbers else; all others by one running sum, whose whole numbers they are the steps of (systematic
+    sampling, Madow and Madow 1944).
     """
     pixels, starts = np.empty(active.shape[0], np.int32), np.empty(active.shape[0] + 1, np.int32)
     alike = np.empty(keys.shape[0], np.int32)
     n = drawn = 0
     starts[0] = 0
+    carried = uniform(seed, 0, 0, 92)
     for i in range(active.shape[0]):
         pixel = active[i]
         key = keys[i] if keys.shape[0] > 0 else pixel
-        count = int(camera_paths[pixel] + uniform(seed, key, 0, 92))
+        # a pixel's own key is above its number, that of a line is not (`line_paths.alike_on_a_line`)
+        if keys.shape[0] > 0 and key <= pixel:
+            count = int(camera_paths[pixel] + uniform(seed, key, 0, 92))
+        else:
+            carried += camera_paths[pixel]
+            if carried < 1.0:
+                continue
+            count = int(carried)
+            carried -= count
         if count > 0:
             pixels[n] = pixel
             if keys.shape[0] > 0:

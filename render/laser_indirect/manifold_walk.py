@@ -19,6 +19,7 @@ import math
 from typing import NamedTuple
 
 import numba
+import numpy as np
 
 from render.base.arrays import Float
 from render.base.vectors import (
@@ -36,7 +37,7 @@ from render.base.vectors import (
 )
 from render.camera.lens import lens_position, lens_project
 from render.camera.view import View
-from render.laser_indirect.path_vertex import Record
+from render.laser_indirect.path_vertex import MOST_FACETS, Record, Records
 from render.material.bsdf import DIELECTRIC, eval_band
 from render.material.fresnel import fresnel_dielectric
 from render.material.record import INDEX, INTERNAL, KIND, METAL_K, METAL_N
@@ -44,13 +45,14 @@ from render.material.scattering import Lobes
 from render.world.triangles import Surface, barycentric, plane_of, slot_reflectance
 
 MOST_ITERATIONS, MOST_HALVINGS = 16, 8
-ACCURACY = 1e-7
-"""Of a solution's slopes q and r: 4e-4 px at a focal length of 3500 px."""
+LAST_STEP = 1e-5
+"""Of Newton's method, in slopes q and r: between planes, whose map bends by less than a tenth over the image, what such
+a step leaves is below 1e-9, 4e-6 px at a focal length of 3500 px."""
 STEP = 1e-6
 """Of the difference quotients, in slopes."""
 BEYOND = 0.25
-"""How far past an edge of a facet, over the facet's width, the first step may come for the walk to go on: between
-planes it comes nearly to the solution. Chosen, not tuned."""
+"""How far past an edge of a facet, over the facet's width, the first guess may be for the walk to go on: between planes
+it is nearly the solution. Chosen, not tuned."""
 
 
 class Solution(NamedTuple):
@@ -143,6 +145,27 @@ def landing(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
+def set_steps(surface: Surface, chains: Records, m: Float, origin: Vector) -> None:
+    """Records (n,) of `specular_chains.SEEN` -> `steps`: by how much the slopes of the ray that comes to a point beside
+    where each has landed differ from its own, for each metre that the point is off. m: as for `walk`."""
+    planes = np.empty((MOST_FACETS, 5))
+    for i in range(chains.shape[0]):
+        chain = chains[i]
+        set_planes(surface, chain, planes)
+        (q, r), o, d, count = chain.slopes, vector(chain.o), vector(chain.d), chain.count
+        ok, p = landing(planes, count, m, origin, q, r, o, d)
+        ok_q, p_q = landing(planes, count, m, origin, q + STEP, r, o, d)
+        ok_r, p_r = landing(planes, count, m, origin, q, r + STEP, o, d)
+        by_q, by_r = scaled(1.0 / STEP, minus(p_q, p)), scaled(1.0 / STEP, minus(p_r, p))
+        qq, qr, rr = dot(by_q, by_q), dot(by_q, by_r), dot(by_r, by_r)
+        determinant = qq * rr - qr * qr
+        known = ok and ok_q and ok_r and determinant > 0.0
+        for axis in range(3):
+            chain.steps[0, axis] = (rr * by_q[axis] - qr * by_r[axis]) / determinant if known else 0.0
+            chain.steps[1, axis] = (qq * by_r[axis] - qr * by_q[axis]) / determinant if known else 0.0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def goes_past(surface: Surface, chain: Record, planes: Float, m: Float, origin: Vector, q: float, r: float) -> bool:
     """Whether a ray comes to the plane of a facet far from the facet."""
     o, d = origin, towards_slopes(m, q, r)
@@ -169,14 +192,18 @@ def walk(
     """The ray from a point, of the lens or the laser, that comes over a chain to x, of a plane with normal n, or
     NO_SOLUTION.
 
-    chain: a record of `specular_chains.SEEN`, whose facets are taken without their edges; its slopes are the first. m
-    (4, 4): the pose of camera or laser; planes: for `set_planes`. A step that does not bring it nearer is halved.
+    chain: a record of `specular_chains.SEEN`, whose facets are taken without their edges, but that a ray far past one
+    is not looked for; its slopes and steps are the first guess. m (4, 4): the pose of camera or laser; planes: for
+    `set_planes`. A step that does not bring it nearer is halved.
     """
     set_planes(surface, chain, planes)
-    count = chain.count
-    q, r = chain.slopes
+    count, off = chain.count, minus(x, vector(chain.o))
+    q = chain.slopes[0] + dot(row_vector(chain.steps, 0), off)
+    r = chain.slopes[1] + dot(row_vector(chain.steps, 1), off)
+    if goes_past(surface, chain, planes, m, origin, q, r):
+        return NO_SOLUTION
     ok, p = landing(planes, count, m, origin, q, r, x, n)
-    for iteration in range(MOST_ITERATIONS):
+    for _ in range(MOST_ITERATIONS):
         ok_q, p_q = landing(planes, count, m, origin, q + STEP, r, x, n)
         ok_r, p_r = landing(planes, count, m, origin, q, r + STEP, x, n)
         if not (ok and ok_q and ok_r):
@@ -188,10 +215,8 @@ def walk(
         dq, dr = (rr * oq - qr * orr) / determinant, (qq * orr - qr * oq) / determinant
         if not determinant > 0.0:
             return NO_SOLUTION
-        if abs(dq) + abs(dr) <= ACCURACY:
+        if abs(dq) + abs(dr) <= LAST_STEP:
             return Solution(True, (q + dq, r + dr), math.sqrt(determinant))
-        if iteration == 0 and goes_past(surface, chain, planes, m, origin, q + dq, r + dr):
-            return NO_SOLUTION
         distance, factor = length(off), 1.0
         for _ in range(MOST_HALVINGS):
             ok, p = landing(planes, count, m, origin, q + factor * dq, r + factor * dr, x, n)

@@ -24,7 +24,7 @@ from render.base.vectors import Vector, dot, store, vector
 from render.camera.camera import Camera
 from render.laser.irradiance import SHEET_SIGMAS
 from render.laser.laser import LineLaser
-from render.laser_indirect.manifold_walk import turned
+from render.laser_indirect.manifold_walk import set_steps, turned
 from render.laser_indirect.path_vertex import (
     MOST_FACETS,
     Records,
@@ -43,6 +43,7 @@ SEEN = np.dtype(
         ("slopes", "f8", 2),  # of the ray: q and r (`manifold_walk`)
         ("o", "f8", 3),  # where it is, or where it has come to
         ("d", "f8", 3),
+        ("steps", "f8", (2, 3)),  # as of `manifold_walk.set_steps`
         ("ray", "i4"),  # its number
         ("share", "f8"),  # of its light that reflections and refractions leave, roughly
     ],
@@ -104,7 +105,7 @@ def _seen_chains(world: World, surface: Surface, camera: Camera, T_world_camera:
     directions, known = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1))
     slopes = directions[known, :2] / directions[known, 2:]
     seen = _landed_rays(world, surface, slopes, T_world_camera)
-    return _listed(seen, world, T_world_camera, spacing / max(camera.fx, camera.fy)) if len(seen) else None
+    return _listed(seen, world, surface, T_world_camera, spacing / max(camera.fx, camera.fy)) if len(seen) else None
 
 
 def _lit_chains(world: World, surface: Surface, laser: LineLaser, T_world_laser: Float) -> tuple[ChainIndex, ...]:
@@ -135,7 +136,7 @@ def _lit_chains(world: World, surface: Surface, laser: LineLaser, T_world_laser:
             (np.concatenate([seen[~narrow], again[known]]), float(apart.max())),
             (again[~known], float(apart.max()) / finer),
         ]
-    return tuple(_listed(some, world, T_world_laser, size) for some, size in lists if len(some))
+    return tuple(_listed(some, world, surface, T_world_laser, size) for some, size in lists if len(some))
 
 
 def _landed_rays(world: World, surface: Surface, slopes: Float, T_world_origin: Float) -> Records:
@@ -162,9 +163,15 @@ def _landed_rays(world: World, surface: Surface, slopes: Float, T_world_origin: 
     return np.concatenate(found)
 
 
-def _listed(seen: Records, world: World, T_world_origin: Float, spacing: float) -> ChainIndex:
+def _listed(seen: Records, world: World, surface: Surface, T_world_origin: Float, spacing: float) -> ChainIndex:
     """The chains of SEEN rays (n,), `spacing` apart, by the cells of space that they come to."""
     distance = np.linalg.norm(seen["o"] - T_world_origin[:3, 3], axis=1)
+    # the rays of a chain are so near each other that those of one do for all
+    (key,) = chain_keys(seen["facets"])
+    _, first = np.unique(key, return_index=True)
+    chains = seen[first]
+    set_steps(surface, chains, T_world_origin, vector(T_world_origin[:3, 3]))
+    seen["steps"] = chains["steps"][key]
     return listed_by_cell(seen, world.rays.centre, CELL_RAYS * spacing * float(np.median(distance)))
 
 

@@ -11,7 +11,7 @@ from render.base.arrays import Float, Int
 from render.importance import Importance
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.bdpt_pass import NO_KEYS, BdptPass, Sampling
-from render.laser_indirect.guiding import active_pixels, no_guide
+from render.laser_indirect.guiding import active_pixels, draw_camera_paths, no_guide
 from render.laser_indirect.integrator import empty_buffer
 from render.laser_indirect.line_goal import Projection
 from render.laser_indirect.line_paths import PathDemand, alike_on_a_line
@@ -148,3 +148,30 @@ def test_shared_random_numbers_move_lines_less_and_leave_every_pixel_unbiased(gr
     # and the line is moved far less
     own_variance, shared_variance = (np.median(moves(found).var(axis=0, ddof=1)) for found in (own, shared))
     assert shared_variance < 0.2 * own_variance
+
+
+def test_camera_paths_are_drawn_as_often_as_expected_and_in_all_to_one_path_of_their_sum() -> None:
+    """Systematic sampling: each pixel by its own expectation, the whole as near to its own as whole numbers allow."""
+    rng = np.random.default_rng(8)
+    expected = rng.random(400) ** 4 * 3.0
+    active, repeats = np.arange(400, dtype=np.int32), 4000
+    drawn = np.zeros((repeats, 400))
+    for seed in range(repeats):
+        found = draw_camera_paths(expected, active, NO_KEYS, seed)
+        drawn[seed, found.pixels] = np.diff(found.starts)
+        assert abs(drawn[seed].sum() - expected.sum()) < 1.0
+    assert np.all(np.abs(drawn - expected) < 1.0)
+    part = expected % 1.0
+    deviation = np.sqrt(np.maximum(part * (1.0 - part), 1e-9) / repeats)
+    score = (drawn.mean(axis=0) - expected) / deviation
+    # 400 of one seed's numbers are not independent: each lies within what happens to one in 50,000
+    assert np.all(np.abs(score) < 4.3)
+
+
+def test_pixels_of_a_line_are_drawn_alike() -> None:
+    expected, active = np.full(64, 0.3), np.arange(64, dtype=np.int32)
+    keys = active + np.int32(8)
+    keys[8:24] = 1
+    for seed in range(50):
+        found = draw_camera_paths(expected, active, keys, seed)
+        assert np.isin(np.arange(8, 24), found.pixels).sum() in (0, 16)
