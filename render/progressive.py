@@ -79,7 +79,8 @@ def frames(
     """As `refine`; scan: what was decided for all frames. Raises InputError, Cancelled.
 
     `run.goal` hears of the frame once the direct light is there, with a coarse look at the ambient light, again of each
-    laser's reflected light as it becomes known, and of all of it; `Frame.importance` is what it said last.
+    laser's reflected light as it becomes known, and of all light that comes before other that it aims;
+    `Frame.importance` is what the last aimed light was rendered by.
     """
     world, scene, step = placed.world, placed.scene, placed.step
     goal = run.goal if settings.goal is not None and scene.lasers else None
@@ -124,8 +125,7 @@ def frames(
                 with clock.shown():
                     yield frame
         look = None if frame.ambient is not None and not follows else look
-        told = product.group == "indirect" and not follows  # what is told of a frame is of all its light
-        if goal is not None and product.group in AIMING and (told or aimed_later(waiting[i + 1 :], product)):
+        if goal is not None and product.group in AIMING and aimed_later(waiting[i + 1 :], product):
             with clock.stage(AIM, 0):
                 if not follows:
                     if look is None and frame.ambient is None:

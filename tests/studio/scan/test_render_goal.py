@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -118,7 +119,8 @@ def test_the_pixel_beside_a_lines_window_is_known_as_the_last_one_in_it(world: W
 
 def test_no_row_is_two_lines_by_the_noise_of_reflected_light_alone() -> None:
     """A narrow line down a groove, seen and lit from farther aside: beside it one path of light in a hundred pixels
-    carries as much as the sensor's noise in each."""
+    carries as much as the sensor's noise in each. Not asked of rows that the sensor's noise alone makes two lines, of
+    light known five times as well: some thirty about the groove's bottom are one or two by a hair."""
     groove = Project.load("v_groove")
     data = json.loads(groove.replaced({"sensor.exposure_time": 0.00222}).to_text())
     rig = data["scene"]["rig"]
@@ -127,11 +129,19 @@ def test_no_row_is_two_lines_by_the_noise_of_reflected_light_alone() -> None:
     rig["lasers"][0]["sheet"] = {"kind": "divergence", "full_angle": 0.00115}
     rig["lasers"][0]["fan_angle"] = 0.7853981633974483
     turned = scaled(Project.from_data(data, "groove").in_folder(groove.folder), 0.5)
-    frame = rendered(turned, build_world(turned.scene, turned.folder, 0))
-    for seed in range(3):
-        image = develop(frame, turned.scene, turned.sensor, seed=seed)
-        flag = extract_line(turned, image, 0, 2).flag[:, 0]
-        assert np.count_nonzero(flag == Flag.OK) > 590 and np.isin(flag, (Flag.BLENDED, Flag.MISFIT)).sum() <= 1
+    world, known = build_world(turned.scene, turned.folder, 0), turned.replaced({"render.goal": {"depth": 0.02}})
+
+    def flags(project: Project) -> Any:
+        frame = rendered(project, world)
+        images = [develop(frame, project.scene, project.sensor, seed=seed) for seed in range(3)]
+        return np.array([extract_line(project, image, 0, 2).flag[:, 0] for image in images])
+
+    two = Flag.BLENDED, Flag.MISFIT
+    decided = ~np.isin(flags(known), two).any(axis=0)
+    assert np.count_nonzero(~decided) < 40
+    for flag in flags(turned)[:, decided]:
+        assert np.count_nonzero(flag == Flag.OK) > 590 - np.count_nonzero(~decided)
+        assert np.isin(flag, two).sum() <= 1
 
 
 def test_a_line_that_is_not_the_lasers_is_known_to_a_share_of_its_width(frame: Frame) -> None:
