@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from analysis.line.result import Flag, Line
-from studio.photographs.line_ends import TONED, ended
+from studio.photographs.line_ends import GAMMA, Tone, ended
 
 COUNT, FIRST, LAST = 200, 40, 159
 
@@ -86,13 +88,29 @@ def test_a_short_piece_far_off_is_the_line_only_if_it_is_as_bright() -> None:
         assert bool(ended(line_of(amplitude, u)).valid[155:165].all()) is stays
 
 
-def test_a_tone_curve_shows_half_of_the_light_at_more_than_half_of_the_number() -> None:
+def test_half_of_the_light_is_found_by_the_tone_curve_and_the_ground_that_it_lies_on() -> None:
     sharp = np.zeros(COUNT)
     sharp[FIRST : LAST + 1] = 1.0
-    shown = 200.0 * np.maximum(gaussian_filter1d(sharp, 1.5), 1e-6) ** (1.0 / 1.5)
-    line = line_of(shown)
-    assert np.flatnonzero(ended(line, TONED).valid[:, 0]).tolist() == list(range(FIRST, LAST + 1))
-    assert ended(line).valid.sum() > LAST - FIRST + 1
+    light = np.maximum(gaussian_filter1d(sharp, 1.5), 1e-9)
+    gain, black = 0.5, 20.0
+    for ground in (0.0, 0.05, 0.5):
+        level = 255.0 * ground ** (1.0 / GAMMA)
+        shown = (255.0 * (ground + 0.4 * light) ** (1.0 / GAMMA) - level) / gain
+        line = line_of(shown)
+        line = replace(line, background=np.where(line.valid, (level - black) / gain, np.nan))
+        kept = ended(line, Tone(gain, black)).valid[:, 0]
+        assert np.flatnonzero(kept).tolist() == list(range(FIRST, LAST + 1)), ground
+        if ground < 0.5:  # by numbers blur would be a part of the line
+            assert ended(line).valid.sum() > LAST - FIRST + 1
+
+
+def test_one_wing_that_tells_too_little_does_not_make_the_line_as_dim_as_its_blur() -> None:
+    sharp = np.zeros(COUNT)
+    sharp[FIRST : LAST + 1] = 400.0
+    line = line_of(gaussian_filter1d(sharp, 1.5))
+    line.flag[100] = Flag.SATURATED
+    line.amplitude[100] = 150.0
+    assert np.flatnonzero(ended(line).valid[:, 0]).tolist() == list(range(FIRST, LAST + 1))
 
 
 def test_a_scan_line_at_an_end_is_the_line_only_where_the_line_goes_on_to() -> None:
