@@ -97,7 +97,10 @@ class _Found:
             clips = float(self.amplitude[self.saturated].min())
             whole = self.amplitude[np.isin(line.flag[rows, k], (Flag.OK, Flag.UNRESOLVED))]
             self.amplitude = np.minimum(self.amplitude, max(clips, float(np.median(whole)) if len(whole) else clips))
-        self.light = self.amplitude if tone is None else tone.light(self.amplitude, line.background[rows, k])
+        # half of what is clipped may be clipped as well: what is not is less than half of what the wings tell
+        told = line.amplitude[rows, k]
+        told = np.where(self.saturated, np.quantile(told[self.saturated], 0.25), told) if self.saturated.any() else told
+        self.light = told if tone is None else tone.light(told, line.background[rows, k])
 
     def usual(self, some: NDArray[np.intp]) -> float:
         """Amplitude of some of them."""

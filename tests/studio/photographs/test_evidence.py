@@ -70,7 +70,7 @@ def test_two_lines_that_are_alike_hide_neither_themselves_nor_which_way_they_run
 
 def test_what_is_weak_elsewhere_says_nothing_of_two_lines_that_hide_each_other() -> None:
     """The edge of a bluish wall stands as clear of all else in its colour as two green lines do of each other."""
-    y, x = np.mgrid[0:360, 0:480].astype(np.float64)
+    _, x = np.mgrid[0:360, 0:480].astype(np.float64)
     lines = sum(np.exp(-0.5 * ((x - at) / 1.5) ** 2) for at in (190.0, 310.0))
     wall = 3.0 * np.exp(-0.5 * ((x - 420.0) / 2.0) ** 2)
     for seed in range(5):

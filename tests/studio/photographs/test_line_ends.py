@@ -113,6 +113,17 @@ def test_one_wing_that_tells_too_little_does_not_make_the_line_as_dim_as_its_blu
     assert np.flatnonzero(ended(line).valid[:, 0]).tolist() == list(range(FIRST, LAST + 1))
 
 
+def test_blur_of_a_clipped_line_is_weighed_against_what_its_wings_tell() -> None:
+    sharp = np.zeros(COUNT)
+    sharp[FIRST : LAST + 1] = 2000.0
+    light = gaussian_filter1d(sharp, 0.7)
+    line = line_of(light)
+    line.flag[light > 500.0] = Flag.SATURATED
+    line.amplitude[FIRST + 7] = 500.0  # one wing that tells no more than what clips
+    assert light[FIRST - 1] > 0.5 * 500.0
+    assert np.flatnonzero(ended(line).valid[:, 0]).tolist() == list(range(FIRST, LAST + 1))
+
+
 def test_a_scan_line_at_an_end_is_the_line_only_where_the_line_goes_on_to() -> None:
     rng = np.random.default_rng(6)
     rows, light = np.arange(COUNT), np.zeros(COUNT)
