@@ -17,6 +17,7 @@ from analysis.line.extract import extract
 from analysis.line.result import Flag, Line
 from analysis.line.selection.continuity import GAP, select_chain
 from analysis.line.settings import ExtractionSettings
+from studio.photographs.line_ends import NEXT, alike
 
 BESIDE, SPARE = 8.0, 12.0
 """Widths of the line, and px, beside it that are looked at: enough to tell its ground by."""
@@ -41,14 +42,26 @@ def looked_at_again(
     u = chain.u[:, 0]
     margin = BESIDE * float(np.median(chain.width[known, 0])) + SPARE
     low = np.floor(np.minimum(u[first], u[last]) - margin).astype(np.intp)
-    rows = image if settings.axis == "rows" else image.T
+    lines = image if settings.axis == "rows" else image.T
     # windows of one size, so that they make an image
-    size = min(int(np.ceil(np.abs(u[last] - u[first]).max() + 2.0 * margin)) + 1, rows.shape[1])
-    low = np.clip(low, 0, rows.shape[1] - size)
-    part = rows[skipped[:, None], low[:, None] + np.arange(size)]
+    size = min(int(np.ceil(np.abs(u[last] - u[first]).max() + 2.0 * margin)) + 1, lines.shape[1])
+    low = np.clip(low, 0, lines.shape[1] - size)
+    part = lines[skipped[:, None], low[:, None] + np.arange(size)]
     alone = settings.model_copy(update={"axis": "rows", "select": "strongest", "peaks": 1, "method": candidates.method})
     found = extract(part, settings=alone, noise=noise, threads=1, shared=False, judged=judged)
-    return _beside(candidates, skipped, replace(found, u=found.u + low[:, None]))
+    place = found.u[:, 0] + low
+    beside = [known[max(0, at - NEXT) : at + NEXT] for at in after[near]]
+    like = np.array([_is_alike(found, i, chain, rows) for i, rows in enumerate(beside)])
+    off = np.maximum(np.minimum(u[first], u[last]) - place, place - np.maximum(u[first], u[last]))
+    kept = (like & (off <= chain.width[first, 0]))[:, None]
+    flag = np.where(found.valid & ~kept, np.uint8(Flag.REJECTED), found.flag).astype(np.uint8)
+    return _beside(candidates, skipped, replace(found, u=np.where(kept, place[:, None], np.nan), flag=flag))
+
+
+def _is_alike(found: Line, i: int, chain: Line, beside: NDArray[np.intp]) -> bool:
+    """Whether what was found on a scan line is as bright and as wide as the line is on those beside it."""
+    width, amplitude = float(found.width[i, 0]), float(found.amplitude[i, 0])
+    return alike(width, amplitude, chain.width[beside, 0], float(np.median(chain.amplitude[beside, 0])))
 
 
 def _beside(line: Line, rows: NDArray[np.intp], more: Line) -> Line:

@@ -16,7 +16,7 @@ COUNT, WIDTH, SHADOW = 120, 400, slice(56, 63)
 NOISE = NoiseModel(gain=0.1, read_noise=10.0)
 
 
-def image(lit: bool) -> np.ndarray:
+def image(lit: float) -> np.ndarray:
     """A line of 60 DN on ground of 100 DN, that falls to 30 DN about the line on the scan lines of the shadow."""
     x, rows = np.arange(WIDTH), np.arange(COUNT)
     ground = np.full((COUNT, WIDTH), 100.0)
@@ -30,7 +30,7 @@ def image(lit: bool) -> np.ndarray:
 
 @pytest.mark.parametrize("axis", ["rows", "columns"])
 def test_what_the_ground_of_the_whole_image_hides_is_found(axis: str) -> None:
-    taken = image(True)
+    taken = image(1.0)
     taken = taken if axis == "rows" else np.ascontiguousarray(taken.T)
     settings = ExtractionSettings(axis=axis, select="strongest", peaks=5)
     first = extract(taken, settings=settings, noise=NOISE)
@@ -42,8 +42,15 @@ def test_what_the_ground_of_the_whole_image_hides_is_found(axis: str) -> None:
     assert np.abs(error).max() < 5.0 * chain.sigma_u[SHADOW, 0].max() < 0.5
 
 
+def test_what_is_much_dimmer_than_the_line_beside_is_none_of_it() -> None:
+    taken = image(0.4)
+    settings = ExtractionSettings(select="strongest", peaks=5)
+    again = looked_at_again(extract(taken, settings=settings, noise=NOISE), taken, settings, NOISE, judged=False)
+    assert (again.flag[SHADOW, -1] == Flag.REJECTED).all() and np.isnan(again.u[SHADOW, -1]).all()
+
+
 def test_nothing_is_found_where_there_is_nothing_and_a_whole_line_stays_as_it_is() -> None:
-    taken = image(False)
+    taken = image(0.0)
     settings = ExtractionSettings(select="strongest", peaks=5)
     first = extract(taken, settings=settings, noise=NOISE)
     again = looked_at_again(first, taken, settings, NOISE, judged=False)
