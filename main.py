@@ -259,9 +259,10 @@ def advise(project: Path | None, **options: Any) -> None:
 @THREADS
 @common
 def twin(project: Path, photographs: tuple[Path, ...], **options: Any) -> None:
-    """Fit a project to raw mono photographs of its scanner: sheet, blur, halo, noise, laser power; a new project.
+    """Fit a project to photographs of its scanner: sheet, blur, halo, noise, laser power; a new project.
 
-    The photographs are the steps of the project's motion, or all of its first step. What they do not tell is kept.
+    The photographs, raw mono ones or those of a webcam or a phone, are the steps of the project's motion, or all of its
+    first step. What they do not tell is kept.
     """
     require_system()
     from studio.commands.twin import twin_project

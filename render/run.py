@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, cast
 
 from numpy.typing import NDArray
 
@@ -137,6 +137,14 @@ class Run:
         """As `Memory.keep`."""
         if self.memory is not None:
             self.memory.keep(part, world, made_of, value, for_others=for_others)
+
+    def remembered(self, part: str, world: object, made_of: Any, make: Callable[[], Item]) -> Item:
+        """The value of a part that this frame or one before it has made, or what `make` makes of it now."""
+        value = self.recall(part, world, made_of)
+        if value is None:
+            value = make()
+            self.leave(part, world, made_of, value)
+        return cast(Item, value)
 
     def taught(self, part: str) -> Any:
         """What the first frame of the block found of a part; None: this is it, or there is no block."""

@@ -51,6 +51,7 @@ from render.laser_indirect.ris import LightVertices, connect_by_ris
 from render.laser_indirect.specular_chains import ChainIndex, lit_chains, mark_listed, seen_chains
 from render.material.material import reflectance_weights
 from render.material.medium import MOST_STEPS
+from render.run import Run
 from render.sampling.random import uniform, wrapped
 from render.world.interior_list import cross_hidden, has_overlaps, occluded_by_visible, pass_hidden, surroundings
 from render.world.placed import PlacedLaser
@@ -113,13 +114,16 @@ class BdptPass:
     """Of them, those that the laser and the camera are within (`render.world.interior_list`)."""
     chains: ChainIndex | None
     """Plane mirrors and glass before the camera, over which light is found by walks; None: there are none."""
-    lit_chains: ChainIndex | None
+    lit_chains: tuple[ChainIndex, ...]
     """Likewise before the laser."""
     clear: Bool = field(default_factory=lambda: NOWHERE)
     """(pixels,) where light over `lit_chains` is integrated (`render.laser_indirect.clear_light`); (0,): nowhere."""
 
     @classmethod
-    def of(cls, placed: PlacedLaser, reference_distance: float, seed: int, kinds: int = ALL_KINDS) -> BdptPass:
+    def of(
+        cls, placed: PlacedLaser, reference_distance: float, seed: int, kinds: int = ALL_KINDS, run: Run = Run()
+    ) -> BdptPass:
+        """Of one laser; run: whose memory has the chains, if another asked for them."""
         world, camera, laser, T_world_camera, T_world_laser = placed
         surface = world.surface_at((laser.wavelength_nm,) * 3)
         nested, ends = has_overlaps(surface), (T_world_laser[:3, 3], T_world_camera[:3, 3])
@@ -140,8 +144,8 @@ class BdptPass:
             specular=specular,
             nested=nested,
             interiors=(at_laser, at_camera),
-            chains=seen_chains(world, surface, camera, T_world_camera) if walked else None,
-            lit_chains=lit_chains(world, surface, laser, T_world_laser) if specular and not nested else None,
+            chains=seen_chains(world, surface, camera, T_world_camera, run) if walked else None,
+            lit_chains=lit_chains(world, surface, laser, T_world_laser, run) if specular and not nested else (),
         )
 
     def run(
@@ -223,8 +227,8 @@ class BdptPass:
             if depth == 0:
                 init_light_mis(vertices, paths, laser)
             else:
-                if self.lit_chains is not None:
-                    mark_listed(vertices, paths, self.lit_chains)
+                for chains in self.lit_chains:
+                    mark_listed(vertices, paths, chains)
                 connected = connect_to_camera(vertices, paths, context, camera, depth, connections)
                 self.splat(connections, connected, 1.0 / sampling.light_paths, buffer)
                 if self.chains is not None and self.kinds & SPECULAR_CHAIN:

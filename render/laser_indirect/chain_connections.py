@@ -108,7 +108,7 @@ def walk_to_camera(  # noqa: PLR0913
     view = sampling.camera
     m, tilt = view.T_world_camera, tilt_matrix(view.distortion[12], view.distortion[13])
     distorted = bool(np.any(view.distortion))
-    places, rgb = np.empty((MOST_FACETS, 3)), np.empty(3)
+    places, planes, rgb = np.empty((MOST_FACETS, 3)), np.empty((MOST_FACETS, 5)), np.empty(3)
     a = b = 0.0
     counts[:] = 0
     for r in range(first, vertices.shape[0]):
@@ -130,7 +130,7 @@ def walk_to_camera(  # noqa: PLR0913
             return r
         for j in range(start, stop):
             seen = index.seen[j]
-            solution = walk(surface, seen, m, origin, x, n)
+            solution = walk(surface, seen, m, origin, x, n, planes)
             if not solution.found:
                 continue
             share = passed(surface, context.weights, seen, m, origin, solution.slopes, False, places, rgb)

@@ -21,19 +21,21 @@ from scipy.ndimage import binary_dilation
 
 from render.base.arrays import Bool, Float, Float32, Long
 from render.base.threads import map_chunks
-from render.importance import Importance, known_below
+from render.importance import known_below
 from render.laser_indirect.accumulator import Accumulator
 from render.laser_indirect.bdpt_pass import CHUNK_PATHS, BdptPass
 from render.laser_indirect.camera_tree import SEED, camera_tree
 from render.laser_indirect.chain_connections import empty_walks
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
+from render.laser_indirect.connections import LaserSampling
 from render.laser_indirect.laser_walks import (
     AFTER_NONE,
     add_walks,
     mark_near,
     walk_to_laser,
 )
-from render.laser_indirect.path_vertex import CAUSTIC, SPECULAR_CHAIN
+from render.laser_indirect.line_goal import Projection
+from render.laser_indirect.path_vertex import CAUSTIC, SPECULAR_CHAIN, PassContext, Records
 from render.laser_indirect.photon_emission import uniform_fan
 from render.laser_indirect.specular_chains import ChainIndex
 from render.run import Run
@@ -100,12 +102,13 @@ class ClearLight:
         noise = other.variance_sum / other.weight**2 + float(variance)
         return math.sqrt(noise / max(signal, 1e-300)) if noise > 0.0 else 0.0
 
-    def line_deviation(self, importance: Importance, laser: int) -> float:
+    def line_deviation(self, projection: Projection) -> float:
         """By how much its error moves nearly all lines at most, over what is allowed."""
-        return (
-            known_below(importance.line_deviations(laser, self.pixels.astype(np.int32), self.error))
-            / importance.allowed
-        )
+        place = np.minimum(np.searchsorted(self.pixels, projection.pixel), max(len(self.pixels) - 1, 0))
+        known = self.pixels[place] == projection.pixel if len(self.pixels) else np.zeros(len(place), np.bool_)
+        moved = np.square(projection.weight[known] * self.error[place[known]])
+        variance = np.bincount(projection.line[known], moved, len(projection.lit))
+        return known_below(np.sqrt(variance[projection.lit]))
 
 
 NO_LIGHT = ClearLight(np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0), 0)
@@ -113,20 +116,16 @@ NO_LIGHT = ClearLight(np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0), 0)
 
 def clear_light(task: BdptPass, run: Run) -> ClearLight:
     """The light over chains that are listed before the laser; the seed changes nothing. Raises Cancelled."""
-    if task.lit_chains is None or sheet_pixels(task, task.lit_chains) < LEAST_SIGMA:
+    if not task.lit_chains or sheet_pixels(task) < LEAST_SIGMA:
         return NO_LIGHT
     made_of = task.view.T_world_camera.tobytes(), task.camera, task.T_world_laser.tobytes(), task.laser
     part = f"clear light of {task.laser.name}"
-    kept: ClearLight | None = run.recall(part, task.world, made_of)
-    if kept is None:
-        kept = integrated(Integral(task, run, []))
-        run.leave(part, task.world, made_of, kept)
-    return kept
+    return run.remembered(part, task.world, made_of, lambda: integrated(Integral(task, run, [])))
 
 
-def sheet_pixels(task: BdptPass, chains: ChainIndex) -> float:
+def sheet_pixels(task: BdptPass) -> float:
     """About the sigma of the sheet in the image where it comes over chains, px."""
-    places = chains.seen["o"]
+    places = np.concatenate([chains.seen["o"] for chains in task.lit_chains])
     from_laser, from_camera = (
         float(np.median(np.linalg.norm(places - pose[:3, 3], axis=1)))
         for pose in (task.T_world_laser, task.view.T_world_camera)
@@ -154,19 +153,24 @@ def integrated(integral: Integral) -> ClearLight:
     off[dark] = radiance[dark].sum(axis=1)
     found = radiance.sum(axis=1)
     if not np.any(found):
-        return ClearLight(pixels, radiance, error, sum(integral.invalid))
+        return NO_LIGHT
     largest = np.maximum(np.maximum(near.max(axis=1), middle), found)
     faint = FAINT * math.sqrt(np.square(found).sum() / np.count_nonzero(found))
+    known, rough = lit & (off <= SMOOTH * largest), _about(off > SMOOTH * largest + faint, beside)
     for cells in FINER:
-        left = np.flatnonzero(_about(off > SMOOTH * largest + faint, beside))
-        if not len(left):
-            break
+        known &= ~rough
+        left = np.flatnonzero(rough)
         finer = integral.sampled(pixels[left], cells, jitter=True)
         off = np.zeros(n)
         off[left] = np.abs((finer - radiance[left]).sum(axis=1))
         # at an edge the error falls as the power 3/2 of the cells' size (Mitchell 1996)
         radiance[left], error[left] = finer, off[left] / 3.0
-    return ClearLight(pixels, np.maximum(radiance, 0.0), error, sum(integral.invalid))
+        met = radiance.sum(axis=1) > 0.0
+        known |= rough & met & (off <= SMOOTH * largest)
+        rough = _about(off > SMOOTH * largest + faint, beside) & met
+    # no pixel is known by rays that met little there, which others may have met: such are left to random paths
+    known[left] = True
+    return ClearLight(pixels[known], np.maximum(radiance[known], 0.0), error[known], sum(integral.invalid))
 
 
 def _about(some: Bool, beside: Long) -> Bool:
@@ -241,15 +245,27 @@ class Integral:
         self, pixels: Long, cells: int, jitter: bool, values: Float | None = None, near: Bool | None = None
     ) -> None:
         """Camera paths of pixels (n,) -> values (n, 2), or near (n,): whether they come to what may be lit."""
-        task, chains = self.task, self.task.lit_chains
-        assert chains is not None
+        task = self.task
         context, laser = task.context(SEED), task.laser_sampling(uniform_fan(0.0, 1.0))
         for vertices, paths in camera_tree(task, pixels, cells, jitter):
-            if near is not None:
-                mark_near(vertices, paths, context.rows, chains, near)
-            if values is None:
-                continue
-            first, counts, walks = 0, np.zeros(2, np.int64), empty_walks(max(len(vertices), chains.most))
-            while first < len(vertices):
-                first = walk_to_laser(first, vertices, paths, chains, task.surface, context, laser, counts, walks)
-                self.invalid.append(add_walks(walks, task.occluded(walks, counts), int(counts[0]), values))
+            for chains in task.lit_chains:
+                if near is not None:
+                    mark_near(vertices, paths, context.rows, chains, near)
+                if values is not None:
+                    self._walk(vertices, paths, chains, context, laser, values)
+
+    def _walk(
+        self,
+        vertices: Records,
+        paths: Records,
+        chains: ChainIndex,
+        context: PassContext,
+        laser: LaserSampling,
+        values: Float,
+    ) -> None:
+        """Camera vertices (n,) -> values (pixels, 2), by walks to the laser over listed chains."""
+        task, first, counts = self.task, 0, np.zeros(2, np.int64)
+        walks = empty_walks(max(len(vertices), chains.most))
+        while first < len(vertices):
+            first = walk_to_laser(first, vertices, paths, chains, task.surface, context, laser, counts, walks)
+            self.invalid.append(add_walks(walks, task.occluded(walks, counts), int(counts[0]), values))

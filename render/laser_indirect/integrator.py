@@ -133,9 +133,8 @@ def indirect_images(
     if high <= low:
         yield IndirectImage(np.zeros(shape, np.float32), 0.0, 0, line_deviation=0.0)
         return
-    task = BdptPass.of(placed, reach, run.seed, kinds)
+    task = BdptPass.of(placed, reach, run.seed, kinds, run)
     clear = clear_light(task, run)
-    clear_deviation = 0.0 if aim is None else clear.line_deviation(aim.importance, aim.laser)
     waves = Waves(replace(task, clear=clear.mask(camera.width * camera.height)), camera, run, clear)
     time_is_over = run.time_is_over(left)
     so_far = run.restore(Accumulator.of_arrays)
@@ -155,7 +154,7 @@ def indirect_images(
             clear.error_with(so_far, kinds),
             *counts,
             clamped_radiance,
-            math.hypot(so_far.line_deviation, clear_deviation),
+            line_deviation(),
             given_up(),
             spread=share,
         )
@@ -163,6 +162,10 @@ def indirect_images(
         if line is None:
             return found
         return replace(found, lines=int(line.projection.lit.sum()), unknown=line.unknown(so_far.weight))
+
+    def line_deviation() -> float:
+        line = so_far.line
+        return math.inf if line is None else math.hypot(so_far.line_deviation, clear.line_deviation(line.projection))
 
     def given_up() -> bool:
         return so_far.line is not None and so_far.line.out_of_reach
@@ -239,7 +242,7 @@ class Waves:
     def begun(self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None) -> Accumulator:
         """An empty accumulator that knows where to look: by what the first frame of a block found, or first looks."""
         if self.lesson is not None and aim is not None:
-            specular = seen_specular(self.task, placed.world, self.camera, placed.T_world_camera)
+            specular = seen_specular(self.task, placed.T_world_camera, self.run)
             found = self.lesson.begin(fan, kinds, specular, aim.importance, aim.laser)
             if found is not None:
                 return found
@@ -252,7 +255,7 @@ class Waves:
         from there, which light matters, and a third, where the line is the goal, how many paths each scan line needs.
         """
         task, camera, look_paths = self.task, self.camera, LOOK_PATHS if aim is None else LINE_LOOK
-        specular = seen_specular(task, placed.world, camera, placed.T_world_camera)
+        specular = seen_specular(task, placed.T_world_camera, self.run)
         behind = specular if task.specular else None
         camera_paths = first_camera_paths(specular, camera, 16 * look_paths)
         first_look = Sampling(look_paths, fan, camera_paths, active_pixels(camera_paths), no_guide(camera))
@@ -341,9 +344,17 @@ def attach_wave_moments(buffers: list[PassBuffer], so_far: Accumulator) -> Float
     return wave_moments
 
 
-def seen_specular(task: BdptPass, world: World, camera: Camera, T_world_camera: Float) -> Bool:
+def seen_specular(task: BdptPass, T_world_camera: Float, run: Run) -> Bool:
     """(pixels,) where the camera sees a mirror or clear glass whose light is wanted; (0,): there is none."""
-    return find_specular_pixels(world, task.surface, camera, T_world_camera) if task.specular else NO_PIXELS
+    if not task.specular:
+        return NO_PIXELS
+    made_of = T_world_camera.tobytes(), task.camera
+    return run.remembered(
+        "specular pixels",
+        task.world,
+        made_of,
+        lambda: find_specular_pixels(task.world, task.surface, task.camera, T_world_camera),
+    )
 
 
 def empty_buffer(pixels: int) -> PassBuffer:

@@ -60,7 +60,7 @@ def walk_to_laser(  # noqa: PLR0913
     context, laser, walks = borrowed(context), borrowed(laser), borrowed(walks)
     m = laser.T_world_laser
     origin = (m[0, 3], m[1, 3], m[2, 3])
-    places, rgb = np.empty((MOST_FACETS, 3)), np.empty(3)
+    places, planes, rgb = np.empty((MOST_FACETS, 3)), np.empty((MOST_FACETS, 5)), np.empty(3)
     counts[:] = 0
     for r in range(first, vertices.shape[0]):
         v, path = vertices[r], paths[r]
@@ -75,7 +75,7 @@ def walk_to_laser(  # noqa: PLR0913
             return r
         for j in range(start, stop):
             seen = index.seen[j]
-            solution = walk(surface, seen, m, origin, x, n)
+            solution = walk(surface, seen, m, origin, x, n, planes)
             if not solution.found:
                 continue
             density = slope_density(solution.slopes[0], laser.beam) * fan_density(solution.slopes[1], laser.beam)

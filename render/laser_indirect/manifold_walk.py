@@ -29,6 +29,7 @@ from render.base.vectors import (
     length,
     minus,
     plus,
+    row_vector,
     scaled,
     store_row,
     vector,
@@ -47,6 +48,9 @@ ACCURACY = 1e-7
 """Of a solution's slopes q and r: 4e-4 px at a focal length of 3500 px."""
 STEP = 1e-6
 """Of the difference quotients, in slopes."""
+BEYOND = 0.25
+"""How far past an edge of a facet, over the facet's width, the first step may come for the walk to go on: between
+planes it comes nearly to the solution. Chosen, not tuned."""
 
 
 class Solution(NamedTuple):
@@ -83,23 +87,73 @@ def turned(surface: Surface, facet: int, o: Vector, d: Vector) -> tuple[bool, Ve
     return beyond > 0.0, o, plus(scaled(1.0 / eta, d), scaled(c / eta - math.copysign(beyond, c), normal))
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def landing(
-    surface: Surface, chain: Record, m: Float, origin: Vector, q: float, r: float, x: Vector, n: Vector
-) -> tuple[bool, Vector]:
-    """F(q, r) on the plane through x with normal n; False: there is none."""
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def set_planes(surface: Surface, chain: Record, planes: Float) -> None:
+    """The planes of a chain -> planes (MOST_FACETS, 5): unit normal, distance from the origin along it, and refractive
+    index; 0: it reflects."""
+    for j in range(chain.count):
+        facet = chain.facets[j]
+        a0, a1, a2, n0, n1, n2 = plane_of(surface, abs(facet) - 1)
+        planes[j, 0], planes[j, 1], planes[j, 2], planes[j, 3] = n0, n1, n2, n0 * a0 + n1 * a1 + n2 * a2
+        planes[j, 4] = surface.rows[surface.object_id[facet - 1], INDEX] if facet > 0 else 0.0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def turned_at(planes: Float, j: int, o: Vector, d: Vector) -> tuple[bool, Vector, Vector]:
+    """As `turned`, at one of the planes of a chain (`set_planes`)."""
+    normal = row_vector(planes, j)
+    c = -dot(normal, d)
+    s = (dot(normal, o) - planes[j, 3]) / c
+    if not s > 0.0:
+        return False, o, d
+    o = along(o, s, d)
+    index = planes[j, 4]
+    if index == 0.0:
+        return True, o, plus(d, scaled(2.0 * c, normal))
+    eta = index if c > 0.0 else 1.0 / index
+    sine2 = (1.0 - c * c) / (eta * eta)
+    if sine2 >= 1.0:
+        return False, o, d
+    return True, o, plus(scaled(1.0 / eta, d), scaled(c / eta - math.copysign(math.sqrt(1.0 - sine2), c), normal))
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def towards_slopes(m: Float, q: float, r: float) -> Vector:
+    """The unit direction of slopes q and r in a pose's frame."""
     d = (
         m[0, 0] * q + m[0, 1] * r + m[0, 2],
         m[1, 0] * q + m[1, 1] * r + m[1, 2],
         m[2, 0] * q + m[2, 1] * r + m[2, 2],
     )
-    o, d = origin, divided(d, length(d))
-    for j in range(chain.count):
-        ok, o, d = turned(surface, chain.facets[j], o, d)
+    return divided(d, length(d))
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def landing(
+    planes: Float, count: int, m: Float, origin: Vector, q: float, r: float, x: Vector, n: Vector
+) -> tuple[bool, Vector]:
+    """F(q, r), over `count` planes, on the plane through x with normal n; False: there is none."""
+    o, d = origin, towards_slopes(m, q, r)
+    for j in range(count):
+        ok, o, d = turned_at(planes, j, o, d)
         if not ok:
             return False, o
     s = dot(n, minus(x, o)) / dot(n, d)
     return s > 0.0, along(o, s, d)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def goes_past(surface: Surface, chain: Record, planes: Float, m: Float, origin: Vector, q: float, r: float) -> bool:
+    """Whether a ray comes to the plane of a facet far from the facet."""
+    o, d = origin, towards_slopes(m, q, r)
+    for j in range(chain.count):
+        ok, o, d = turned_at(planes, j, o, d)
+        if not ok:
+            return False
+        f, g = barycentric(surface, abs(chain.facets[j]) - 1, o)
+        if min(f, g, 1.0 - f - g) < -BEYOND:
+            return True
+    return False
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -110,18 +164,21 @@ def walk(
     origin: Vector,
     x: Vector,
     n: Vector,
+    planes: Float,
 ) -> Solution:
     """The ray from a point, of the lens or the laser, that comes over a chain to x, of a plane with normal n, or
     NO_SOLUTION.
 
     chain: a record of `specular_chains.SEEN`, whose facets are taken without their edges; its slopes are the first. m
-    (4, 4): the pose of camera or laser. A step that does not bring it nearer is halved.
+    (4, 4): the pose of camera or laser; planes: for `set_planes`. A step that does not bring it nearer is halved.
     """
+    set_planes(surface, chain, planes)
+    count = chain.count
     q, r = chain.slopes
-    ok, p = landing(surface, chain, m, origin, q, r, x, n)
-    for _ in range(MOST_ITERATIONS):
-        ok_q, p_q = landing(surface, chain, m, origin, q + STEP, r, x, n)
-        ok_r, p_r = landing(surface, chain, m, origin, q, r + STEP, x, n)
+    ok, p = landing(planes, count, m, origin, q, r, x, n)
+    for iteration in range(MOST_ITERATIONS):
+        ok_q, p_q = landing(planes, count, m, origin, q + STEP, r, x, n)
+        ok_r, p_r = landing(planes, count, m, origin, q, r + STEP, x, n)
         if not (ok and ok_q and ok_r):
             return NO_SOLUTION
         by_q, by_r, off = scaled(1.0 / STEP, minus(p_q, p)), scaled(1.0 / STEP, minus(p_r, p)), minus(x, p)
@@ -133,9 +190,11 @@ def walk(
             return NO_SOLUTION
         if abs(dq) + abs(dr) <= ACCURACY:
             return Solution(True, (q + dq, r + dr), math.sqrt(determinant))
+        if iteration == 0 and goes_past(surface, chain, planes, m, origin, q + dq, r + dr):
+            return NO_SOLUTION
         distance, factor = length(off), 1.0
         for _ in range(MOST_HALVINGS):
-            ok, p = landing(surface, chain, m, origin, q + factor * dq, r + factor * dr, x, n)
+            ok, p = landing(planes, count, m, origin, q + factor * dq, r + factor * dr, x, n)
             if ok and length(minus(x, p)) < distance:
                 break
             factor *= 0.5
@@ -161,12 +220,7 @@ def passed(  # noqa: PLR0913
     index; power, from the light, does not. weights (3,) of the RGB reflectance; rgb (3,) is changed.
     """
     q, r = slopes
-    d = (
-        m[0, 0] * q + m[0, 1] * r + m[0, 2],
-        m[1, 0] * q + m[1, 1] * r + m[1, 2],
-        m[2, 0] * q + m[2, 1] * r + m[2, 2],
-    )
-    o, d = origin, divided(d, length(d))
+    o, d = origin, towards_slopes(m, q, r)
     share = 1.0
     for j in range(chain.count):
         t = abs(chain.facets[j]) - 1

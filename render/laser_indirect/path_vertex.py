@@ -158,7 +158,7 @@ def intersect(
         v.turbid = INNER if context.rows[material, KIND] == SUBSURFACE else 0
         paths[hits] = paths[r]
         path = paths[hits]
-        path.triangle = t
+        path.triangle, path.walked = t, False
         bit = bit_of(context.rows, material)
         if bit > 0 or path.interior > 0:
             set_surroundings(v, context.rows, path.interior & ~bit, bit)

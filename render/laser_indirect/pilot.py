@@ -78,10 +78,10 @@ def indirect_pilot(
     if high <= low:
         return IndirectPilot((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
     placed = PlacedLaser(world, camera, laser, T_world_camera, T_world_laser)
-    task = BdptPass.of(placed, reach, run.seed)
+    task = BdptPass.of(placed, reach, run.seed, run=run)
     clear = clear_light(task, run)
     task = replace(task, clear=clear.mask(camera.width * camera.height))
-    specular = seen_specular(task, world, camera, T_world_camera)
+    specular = seen_specular(task, T_world_camera, run)
     fan, guide, sums = uniform_fan(low, high), no_guide(camera), []
     buffer = empty_buffer(camera.width * camera.height)
     camera_paths = first_camera_paths(specular, camera, PILOT_PATHS)

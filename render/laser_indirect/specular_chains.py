@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from render.base.arrays import Bool, Float, Int, Long
 from render.base.borrowed import borrowed
@@ -31,6 +32,7 @@ from render.laser_indirect.path_vertex import (
 from render.material.bsdf import is_specular_row
 from render.material.fresnel import fresnel_dielectric
 from render.material.record import DIELECTRIC, INDEX, KIND
+from render.run import Run
 from render.world.triangles import Surface, off_surface, plane_of
 from render.world.world import World
 
@@ -41,6 +43,7 @@ SEEN = np.dtype(
         ("slopes", "f8", 2),  # of the ray: q and r (`manifold_walk`)
         ("o", "f8", 3),  # where it is, or where it has come to
         ("d", "f8", 3),
+        ("ray", "i4"),  # its number
         ("share", "f8"),  # of its light that reflections and refractions leave, roughly
     ],
     align=True,
@@ -49,6 +52,9 @@ GRID_RAYS = 1 << 14
 """Rays of the grid, about; of the camera's no less than a pixel apart. Chosen, not tuned."""
 CELL_RAYS = 2.0
 """Size of a cell, in the spacing of the grid's rays at their median distance."""
+NARROW, FINER, MOST_FINER_RAYS = 4, 8, 1 << 18
+"""Chains from the laser that fewer rays come over are looked for again, by so many rays a side of each of theirs and of
+the rays beside them, of so many in all at most: a facet is narrower than the grid. Chosen, not tuned."""
 LEAST_SHARE = 1e-4
 """Of a ray's light, below which it is not followed; what it would have shown is merged. Chosen, not tuned."""
 BITS = 21
@@ -70,42 +76,80 @@ class ChainIndex(NamedTuple):
     """Of a cell's chains."""
 
 
-def seen_chains(world: World, surface: Surface, camera: Camera, T_world_camera: Float) -> ChainIndex | None:
+def seen_chains(
+    world: World, surface: Surface, camera: Camera, T_world_camera: Float, run: Run = Run()
+) -> ChainIndex | None:
     """The chains over which the camera sees rough surfaces; None: none is of plane mirrors and faces alone."""
+    made_of = T_world_camera.tobytes(), camera, surface.rows.tobytes()
+    return run.remembered(
+        "chains before the camera", world, made_of, lambda: _seen_chains(world, surface, camera, T_world_camera)
+    )
+
+
+def lit_chains(
+    world: World, surface: Surface, laser: LineLaser, T_world_laser: Float, run: Run = Run()
+) -> tuple[ChainIndex, ...]:
+    """The chains over which the laser lights rough surfaces, wide ones and narrow ones, each in one list; (): there are
+    none, or its sheet has a waist, so that its light does not come from one point."""
+    made_of = T_world_laser.tobytes(), laser
+    return run.remembered(
+        f"chains before {laser.name}", world, made_of, lambda: _lit_chains(world, surface, laser, T_world_laser)
+    )
+
+
+def _seen_chains(world: World, surface: Surface, camera: Camera, T_world_camera: Float) -> ChainIndex | None:
+    """As `seen_chains`, found now."""
     spacing = max(1.0, math.sqrt(camera.width * camera.height / GRID_RAYS))
     v, u = np.mgrid[0 : camera.height - 1 : spacing, 0 : camera.width - 1 : spacing]
     directions, known = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1))
     slopes = directions[known, :2] / directions[known, 2:]
-    return _chains_of_rays(world, surface, slopes, T_world_camera, spacing / max(camera.fx, camera.fy))
+    seen = _landed_rays(world, surface, slopes, T_world_camera)
+    return _listed(seen, world, T_world_camera, spacing / max(camera.fx, camera.fy)) if len(seen) else None
 
 
-def lit_chains(world: World, surface: Surface, laser: LineLaser, T_world_laser: Float) -> ChainIndex | None:
-    """The chains over which the laser lights rough surfaces; None: there are none, or its sheet has a waist, so that
-    its light does not come from one point."""
+def _lit_chains(world: World, surface: Surface, laser: LineLaser, T_world_laser: Float) -> tuple[ChainIndex, ...]:
+    """As `lit_chains`, found now."""
     beam = laser.packed()
     if beam[1] != 0.0:
-        return None
+        return ()
     across, along = SHEET_SIGMAS * beam[3], beam[4]
     spacing = math.sqrt(4.0 * across * along / GRID_RAYS)
     x, y = (np.linspace(-end, end, max(3, math.ceil(2.0 * end / spacing))) for end in (across, along))
-    slopes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    return _chains_of_rays(world, surface, slopes, T_world_laser, max(x[1] - x[0], y[1] - y[0]))
+    slopes, apart = np.stack(np.meshgrid(x, y), axis=-1), np.array([x[1] - x[0], y[1] - y[0]])
+    seen = _landed_rays(world, surface, slopes.reshape(-1, 2), T_world_laser)
+    (key,) = chain_keys(seen["facets"])
+    narrow = np.bincount(key)[key] < NARROW
+    about = np.zeros(slopes.shape[:2], np.bool_)
+    about.ravel()[seen["ray"][narrow]] = True
+    about = binary_dilation(about, np.ones((3, 3)))
+    finer = min(FINER, int(math.sqrt(MOST_FINER_RAYS / max(int(about.sum()), 1))))
+    lists = [(seen, float(apart.max()))]
+    if about.any() and finer > 1:
+        part = (np.arange(finer) + 0.5) / finer - 0.5
+        parts = np.stack(np.meshgrid(part, part), axis=-1).reshape(-1, 2) * apart
+        again = _landed_rays(world, surface, (slopes[about][:, None] + parts).reshape(-1, 2), T_world_laser)
+        found, wide = chain_keys(again["facets"], seen["facets"][~narrow])
+        known = np.isin(found, wide)
+        # a chain is in one list alone, or its light would be found twice
+        lists = [
+            (np.concatenate([seen[~narrow], again[known]]), float(apart.max())),
+            (again[~known], float(apart.max()) / finer),
+        ]
+    return tuple(_listed(some, world, T_world_laser, size) for some, size in lists if len(some))
 
 
-def _chains_of_rays(
-    world: World, surface: Surface, slopes: Float, T_world_origin: Float, spacing: float
-) -> ChainIndex | None:
-    """The chains that rays of slopes (n, 2), `spacing` apart, come over from the origin of a frame."""
+def _landed_rays(world: World, surface: Surface, slopes: Float, T_world_origin: Float) -> Records:
+    """(k,) SEEN: where rays of slopes (n, 2) from the origin of a frame come to over chains."""
     rays = world.rays
     plain = (surface.detail == 0) & (surface.second < 0)
     walkable = plain & np.array([is_specular_row(row) for row in surface.rows])
     if not np.any(walkable[: surface.object_id.max() + 1]):
-        return None
+        return np.empty(0, SEEN)
     ahead = np.zeros(len(slopes), SEEN)
     directions = np.concatenate([slopes, np.ones((len(slopes), 1))], axis=1)
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     ahead["slopes"], ahead["d"] = slopes, directions @ T_world_origin[:3, :3].T
-    ahead["o"], ahead["share"] = T_world_origin[:3, 3], 1.0
+    ahead["o"], ahead["share"], ahead["ray"] = T_world_origin[:3, 3], 1.0, np.arange(len(slopes))
     found: list[Records] = []
     for _ in range(MOST_FACETS + 1):
         triangle, _ = rays.intersect((ahead["o"] - rays.centre).astype(np.float32), ahead["d"].astype(np.float32))
@@ -115,16 +159,18 @@ def _chains_of_rays(
         found.append(landed[:k])
         if not n:
             break
-    seen = np.concatenate(found)
-    if not len(seen):
-        return None
+    return np.concatenate(found)
+
+
+def _listed(seen: Records, world: World, T_world_origin: Float, spacing: float) -> ChainIndex:
+    """The chains of SEEN rays (n,), `spacing` apart, by the cells of space that they come to."""
     distance = np.linalg.norm(seen["o"] - T_world_origin[:3, 3], axis=1)
-    return listed_by_cell(seen, rays.centre, CELL_RAYS * spacing * float(np.median(distance)))
+    return listed_by_cell(seen, world.rays.centre, CELL_RAYS * spacing * float(np.median(distance)))
 
 
 def listed_by_cell(seen: Records, centre: Float, size: float) -> ChainIndex:
     """SEEN records (n,) by the cells within half a cell of where they have come to, one of each chain and cell."""
-    key, low = chain_keys(seen["facets"]), np.floor((seen["o"] - centre) / size - 0.5).astype(np.int64)
+    (key,), low = chain_keys(seen["facets"]), np.floor((seen["o"] - centre) / size - 0.5).astype(np.int64)
     corners = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)])
     place = low[:, None] + corners + (1 << (BITS - 1))
     cells = ((place[..., 0] << 2 * BITS) | (place[..., 1] << BITS) | place[..., 2]).ravel()
@@ -138,10 +184,11 @@ def listed_by_cell(seen: Records, centre: Float, size: float) -> ChainIndex:
     return ChainIndex(cells, starts, seen.take(whose[first]), centre, size, int(np.diff(starts).max()))
 
 
-def chain_keys(facets: Int) -> Long:
-    """(n, MOST_FACETS) facets -> (n,) a number for each list of them, the same for the same."""
-    _, key = np.unique(facets, axis=0, return_inverse=True)
-    return key.ravel()
+def chain_keys(*facets: Int) -> list[Long]:
+    """(n, MOST_FACETS) facets -> (n,) a number for each list of them, the same for the same in all of the arrays."""
+    rows = np.ascontiguousarray(np.concatenate(facets))
+    _, key = np.unique(rows.view(np.dtype((np.void, rows.dtype.itemsize * rows.shape[1]))), return_inverse=True)
+    return np.split(key.ravel(), np.cumsum([len(some) for some in facets])[:-1])
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -203,7 +250,6 @@ def mark_listed(vertices: Records, paths: Records, index: ChainIndex) -> None:
     vertices, paths, index = borrowed(vertices), borrowed(paths), borrowed(index)
     for r in range(vertices.shape[0]):
         path = paths[r]
-        path.walked = False
         i = cell_at(index, vector(vertices[r].p)) if path.count > 0 else -1
         if i < 0:
             continue

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 NAMES = {
     "scale": ("sheet's width, of the project's", "x"), "sheet_px": ("sheet's sigma in the image", "px"),
-    "blur_px": ("lens blur", "px"), "halo": ("halo, share of the light", ""), "halo_px": ("halo's sigma", "px"),
+    "line_px": ("line's sigma in the image, less the pixel's", "px"), "blur_px": ("lens blur", "px"),
+    "halo": ("halo, share of the light", ""), "halo_px": ("halo's sigma", "px"),
     "gain": ("gain", "DN/e-"), "read_noise": ("read noise", "e-"), "scatter": ("the light's own scatter", ""),
     "alike": ("noise shared by neighbouring scan lines", ""), "saturation": ("saturation", "DN"),
     "ambient": ("other light beside the line", "e-"), "peak": ("brightest pixel of a scan line", "e-"),

@@ -5,7 +5,7 @@ Every scan line is looked at about its own position: thousands of them sample on
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,10 +20,16 @@ CORE = 3.5
 """Widths of the line within which a scan line is compared with the mean profile."""
 SAMPLES = 8
 """Pixels of a profile's bin below which it says nothing."""
+BRIGHTEST = 0.998
+"""Quantile of the light up to which there are bins."""
+ODD = 4.0
+"""Times the usual that the noise of a whole scan line may be."""
 LEVELS, FEWEST = 24, 30
 """Bins of light for the noise, and pixels below which one says nothing."""
 DARK = 3.0
 """DN above the lowest number from which a mean is not cut off by it."""
+BESIDE = 8
+"""px beyond these that tell the noise of the ground."""
 LEAST_FREE = 0.1
 """Share of a pixel's noise that the fit of its scan line leaves, below which it says nothing."""
 
@@ -38,6 +44,12 @@ class Stretch:
     """(n,) of the positions, px."""
     row: NDArray[np.intp]
     """(n,) scan line."""
+    column: NDArray[np.intp]
+    """(n,) of the window's first pixel."""
+
+    def of(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> Stretch:
+        """Some of its scan lines."""
+        return Stretch(self.values[some], self.distance[some], self.sigma_u[some], self.row[some], self.column[some])
 
 
 class Profile(NamedTuple):
@@ -59,6 +71,8 @@ class Transfer:
     light: Float
     variance: Float
     sigma: Float
+    edges: Float
+    """(k + 1,) DN of the laser's light between which each is."""
     alike: float
     """Correlation of the noise of neighbouring scan lines."""
     alike_sigma: float
@@ -75,7 +89,7 @@ def stretch_of(image: NDArray[np.generic], line: Line, half: int, saturation: fl
     values = upright[rows[:, None], columns]
     free = values.max(axis=1, initial=0.0) < saturation
     rows, columns, values = rows[free], columns[free], values[free]
-    return Stretch(values, columns - line.u[rows, :1], line.sigma_u[rows, 0], rows)
+    return Stretch(values, columns - line.u[rows, :1], line.sigma_u[rows, 0], rows, columns[:, 0])
 
 
 def mean_profile(stretch: Stretch, rows: NDArray[np.intp], width: float) -> Profile:
@@ -103,16 +117,26 @@ def _beside(distance: Float, width: float) -> NDArray[np.bool_]:
     return found
 
 
-def transfer_of(stretch: Stretch, shape: Float, slope: Float, width: float, lowest: float) -> Transfer | None:
+def near(stretch: Stretch, width: float) -> Stretch:
+    """The pixels whose noise is looked at: within `CORE` widths of the line, and `BESIDE`."""
+    middle, reach = stretch.values.shape[1] // 2, int(np.ceil(CORE * width)) + BESIDE
+    columns = slice(max(middle - reach, 0), middle + reach + 1)
+    return replace(stretch, values=stretch.values[:, columns], distance=stretch.distance[:, columns])
+
+
+def transfer_of(
+    stretch: Stretch, shape: Float, slope: Float, width: float, lowest: float, edges: Float | None = None
+) -> Transfer | None:
     """Noise of the pixels near the line: what is left of each scan line by its own height, place and ground.
 
     shape, slope: (n, w) model of the line at every pixel, and its derivative. lowest: DN that the sensor cuts off at.
-    None: too few pixels.
+    edges: DN of the laser's light by which pixels are sorted; None: as many in each. None: too few pixels.
     """
-    near = np.abs(np.arange(stretch.values.shape[1]) - stretch.values.shape[1] // 2) <= np.ceil(CORE * width)
-    values = stretch.values[:, near]
-    basis = np.stack([shape[:, near], slope[:, near], np.ones_like(values)], axis=2)
-    after = np.flatnonzero(np.diff(stretch.row) == 1)
+    core = np.abs(np.arange(stretch.values.shape[1]) - stretch.values.shape[1] // 2) <= np.ceil(CORE * width)
+    values = stretch.values
+    basis = np.stack([shape, slope, np.ones_like(values)], axis=2)
+    # the same pixels of the next scan line: what the profile misses is another at another place
+    after = np.flatnonzero((np.diff(stretch.row) == 1) & (np.diff(stretch.column) == 0))
     weight = np.ones_like(values)
     for _ in range(3):  # weights of the noise found so far
         root = np.sqrt(weight)
@@ -129,20 +153,47 @@ def transfer_of(stretch: Stretch, shape: Float, slope: Float, width: float, lowe
             return None
         line = np.polynomial.polynomial.polyfit(level[known], squares[known], 1)
         weight = 1.0 / np.maximum(line[0] + line[1] * mean, 0.05 * float(np.mean(squares[known])))
-    light = (np.linalg.pinv(r) @ seen[..., None])[:, :1, 0] * shape[:, near]
+    light = (np.linalg.pinv(r) @ seen[..., None])[:, :1, 0] * shape
     light = 0.5 * (light[after] + light[after + 1])
-    edges = np.unique(np.quantile(level[known], np.linspace(0.0, 1.0, LEVELS + 1)))
-    place = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, len(edges) - 2)
+    # a scan line that no line of this shape is on, as at an edge, has no noise to tell
+    odd = np.nanmean(np.where(known, squares / np.maximum(line[0] + line[1] * level, 1e-9), np.nan), axis=1)
+    known &= (odd <= ODD * np.nanmedian(odd))[:, None]
+    edges = light_edges(light[known]) if edges is None else edges
+    place = np.clip(np.searchsorted(edges, light, side="right") - 1, 0, len(edges) - 2)
     rows = []
     for k in range(len(edges) - 1):
         here = known & (place == k)
         if here.sum() >= FEWEST:
             some = squares[here]
             # each scan line is in two differences
-            rows.append([level[here].mean(), light[here].mean(), some.mean(), some.std() / np.sqrt(here.sum() / 1.5)])
+            sigma = some.std() / some.mean() / np.sqrt(here.sum() / 1.5)
+            rows.append([level[here].mean(), light[here].mean(), some.mean(), sigma])
+        else:
+            rows.append([np.nan] * 4)
     mean_of, light_of, variance, sigma = np.array(rows).T
-    equal = left * root
+    sigma = sigma * _smooth(mean_of, variance, sigma)
+    equal = (left * root)[:, core]
     pairs = equal[after] * equal[after + 1]
     count = int(np.isfinite(pairs).sum())
     alike = float(np.nanmean(pairs) / np.nanmean(equal**2))
-    return Transfer(mean_of, light_of, variance, sigma, alike, 1.0 / np.sqrt(count))
+    return Transfer(mean_of, light_of, variance, sigma, edges, alike, 1.0 / np.sqrt(count))
+
+
+def light_edges(light: Float) -> Float:
+    """(m,) DN of the laser's light on pixels -> edges of bins, finer where it is little and most pixels are."""
+    top = float(np.quantile(light, BRIGHTEST))
+    return np.concatenate([[-np.inf], top * np.linspace(0.0, 1.0, LEVELS)[1:] ** 2])
+
+
+def _smooth(level: Float, variance: Float, relative: Float) -> Float:
+    """(k,) variance, DN^2, as a parabola of the level: by their own noise bins that are low would weigh more."""
+    good = np.isfinite(variance) & (relative > 0.0)
+    out = np.full(len(level), np.nan)
+    if good.sum() < 4:
+        return np.where(good, variance, np.nan)
+    weight, usual = 1.0 / relative[good], variance[good]
+    for _ in range(3):
+        found = np.polynomial.polynomial.polyfit(level[good], variance[good], 2, w=weight / usual)
+        usual = np.maximum(np.polynomial.polynomial.polyval(level[good], found), 0.1 * variance[good].min())
+    out[good] = usual
+    return out

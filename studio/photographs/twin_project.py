@@ -18,9 +18,13 @@ from render.scene.scene import Scene
 from render.sensor.sensor import Sensor
 from render.truth.laser_curve import laser_curve
 from render.world.world import build_world
+from studio.photographs.evidence import COLOURS
 from studio.photographs.photograph_set import Wishes, look_at
 from studio.photographs.photographs import Measured, check_size, extract_photograph, naming
-from studio.photographs.twin import Told, Twin, fitted, look
+from studio.photographs.rehearsal import Stage, ground_of, rehearsed
+from studio.photographs.twin import Told, Twin, by_rehearsal
+from studio.photographs.twin_light import FULL, light_of, numbers_of
+from studio.photographs.twin_seen import Seen, look
 from studio.preview.inspection import inspect
 from studio.project.project import Project
 
@@ -45,20 +49,35 @@ def twin_of(project: Project, root: Path, laser: int, paths: Sequence[Path], thr
     InputError: the sensor is none that this fits, a photograph is not of its size, type or bits, or too little is seen.
     """
     sensor = project.sensor
-    if sensor.processing is not None or sensor.colour != "mono":
-        found = "image processing" if sensor.processing is not None else "a Bayer sensor"
-        cure = "take raw mono images, and a project with such a sensor"
-        raise InputError("a twin is fitted to raw mono images", where="sensor", found=found, cure=cure)
-    settings = project.extraction
+    if sensor.processing is None and sensor.colour != "mono":
+        cure = "take raw mono images or a camera's photographs, and a project with such a sensor"
+        raise InputError("a twin is not fitted to a raw mosaic", where="sensor", found="a Bayer sensor", cure=cure)
+    settings, numbers = project.extraction, numbers_of(project, laser)
+    lossy = []
     for path in paths:
-        _check(look_at([path], settings, Wishes(settings.axis)).read(path)[0].pixels, path, project)
-    seen_as = look_at(paths, settings, Wishes(settings.axis, channel="mono"))
+        taken = look_at([path], settings, Wishes(settings.axis)).read(path)[0]
+        _check(taken.pixels, path, project)
+        lossy.append(taken.lossy)
+    seen_as = look_at(paths, settings, Wishes(settings.axis, channel=numbers.channel))
     measured = [extract_photograph(path, seen_as, threads) for path in paths]
     curves = _curves(project.scene, root, laser, measured, threads)
     with naming(paths[0]):
-        seen = look(project, laser, [one.image for one in measured], [one.line for one in measured], curves)
-        twin = fitted(project, seen)
+        images = [light_of(one.image, sensor, numbers.channel) for one in measured]
+        seen = look(project, laser, images, [one.line for one in measured], curves, numbers)
+    axis = seen_as.settings.axis
+    by_number = {one.photograph: one for one in seen.pieces}
+    ground = [
+        ground_of(one.image, by_number[k], sensor, axis) if k in by_number else np.zeros(1)
+        for k, one in enumerate(measured)
+    ]
+    stage = Stage(laser, paths, seen_as, lossy, ground, threads)
+
+    def rehearse(twin: Twin, seed: int, louder: float) -> Seen:
+        return rehearsed(_louder(_with_twin(project, laser, twin), louder), seen, stage, twin.scale.value, seed)
+
     try:
+        with naming(paths[0]):
+            twin = by_rehearsal(project, seen, numbers, rehearse)
         made, power = _with_power(_with_twin(project, laser, twin), root, laser, twin, threads)
     except ValidationError as error:
         first = error.errors()[0]
@@ -74,6 +93,11 @@ def twin_of(project: Project, root: Path, laser: int, paths: Sequence[Path], thr
             "the line is not where the project's surface has it, so the surface is taken to face the laser: on a "
             "slanted one the sheet comes out too wide or too narrow"
         )
+    if twin.blur_px.why:
+        warnings.append(
+            f"the photographs tell the line's width, {twin.line_px.value:.4g} px, and not what of it is the sheet's, "
+            f"which holds if the lens blur is {twin.blur_px.value:.3g} px; a part near and far, or slanted, tells"
+        )
     if twin.ambient.value > 0.01 * twin.peak.value:
         warnings.append(
             f"{twin.ambient.value:.0f} e- of other light are beside the line; the project's lights are as they were"
@@ -86,8 +110,12 @@ def _check(pixels: NDArray[np.generic], path: Path, project: Project) -> None:
     bits = project.sensor.bits
     with naming(path):
         check_size(pixels, project.scene.camera)
-    if pixels.ndim != 2:
-        raise InputError("a twin is fitted to raw mono images", where=str(path), found="a photograph in colour")
+    coloured = project.sensor.colour != "mono"
+    if (pixels.ndim == 3) != coloured:
+        found = "a photograph in colour" if pixels.ndim == 3 else "a photograph without colour"
+        wanted = "in colour" if coloured else "mono"
+        raise InputError(f"the project's sensor takes images that are {wanted}", where=str(path), found=found)
+    bits = bits if project.sensor.processing is None else 8
     if pixels.dtype != (np.uint8 if bits == 8 else np.uint16) or int(pixels.max()) > 2**bits - 1:
         found = f"{pixels.dtype} up to {pixels.max()}"
         cure = "set sensor.bits and sensor.black_level in the project"
@@ -117,13 +145,27 @@ def _with_twin(project: Project, laser: int, twin: Twin) -> Project:
     values.update(blur_sigma=twin.blur_px.value * pitch, halo=twin.halo.value, halo_sigma=twin.halo_px.value * pitch)
     gain, top = twin.gain.value, 2.0**sensor.bits - 1.0
     values.update(read_noise=twin.read_noise.value)
-    if sensor.speckle == "off":
-        values.update(prnu=twin.scatter.value)
-    values.update(full_well=(twin.saturation.value - sensor.black_level) / gain)
-    values.update(gain=gain if sensor.gain is not None or twin.saturation.value < top else None)
+    if sensor.processing is not None:
+        share = numbers_of(project, laser).share
+        values.update(full_well=FULL * share / gain, gain=None)
+    else:
+        values.update(full_well=(twin.saturation.value - sensor.black_level) / gain)
+        values.update(gain=gain if sensor.gain is not None or twin.saturation.value < top else None)
+        if sensor.speckle == "off":
+            values.update(prnu=twin.scatter.value)
     lasers = list(project.scene.lasers)
     lasers[laser] = wider(lasers[laser], twin.scale.value)
     return _with_lasers(project, tuple(lasers)).model_copy(update={"sensor": Sensor.model_validate(values)})
+
+
+def _louder(project: Project, times: float) -> Project:
+    """The project with so many times the variance of the noise, at the same light and numbers."""
+    if times == 1.0:
+        return project
+    sensor = project.sensor
+    values = {"full_well": sensor.full_well / times, "read_noise": sensor.read_noise / times**0.5}
+    gain = None if sensor.gain is None else sensor.gain * times
+    return project.model_copy(update={"sensor": sensor.model_copy(update={**values, "gain": gain})})
 
 
 def wider(laser: LineLaser, scale: float) -> LineLaser:
@@ -139,7 +181,7 @@ def wider(laser: LineLaser, scale: float) -> LineLaser:
 
 def _with_power(project: Project, root: Path, laser: int, twin: Twin, threads: int | None) -> tuple[Project, Told]:
     """The project whose line is as bright as the photographs': power times reflectance is all that they show."""
-    light = inspect(project, root, threads).lasers[laser].light_electrons
+    light = inspect(_of_one_colour(project, laser), root, threads).lasers[laser].light_electrons
     lasers = list(project.scene.lasers)
     power = lasers[laser].power
     if not light or twin.peak.value <= 0.0:
@@ -147,6 +189,17 @@ def _with_power(project: Project, root: Path, laser: int, twin: Twin, threads: i
     scaled = power * twin.peak.value / light
     lasers[laser] = LineLaser.model_validate({**lasers[laser].model_dump(), "power": scaled})
     return _with_lasers(project, tuple(lasers)), Told(scaled, scaled * twin.peak.sigma / twin.peak.value)
+
+
+def _of_one_colour(project: Project, laser: int) -> Project:
+    """The project with a sensor that has the colour everywhere that is measured, which a mosaic has not on each row."""
+    channel = numbers_of(project, laser).channel
+    if channel == "mono":
+        return project
+    curve = project.sensor.efficiency[COLOURS.index(channel)]
+    return project.model_copy(
+        update={"sensor": project.sensor.model_copy(update={"colour": "mono", "efficiency": (curve,)})}
+    )
 
 
 def _with_lasers(project: Project, lasers: tuple[LineLaser, ...]) -> Project:

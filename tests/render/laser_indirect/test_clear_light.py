@@ -10,6 +10,7 @@ import pytest
 
 from render.laser.laser import Divergence, Waist
 from render.laser_direct.integrator import direct_image
+from render.laser_indirect import specular_chains
 from render.laser_indirect.accumulator import Accumulator
 from render.laser_indirect.bdpt_pass import BdptPass
 from render.laser_indirect.clear_light import NO_LIGHT, Integral, clear_light
@@ -18,7 +19,7 @@ from render.laser_indirect.path_vertex import ALL_KINDS, CAUSTIC, INTERREFLECTIO
 from render.material.material import Conductor
 from render.mesh.primitives import primitive_mesh
 from render.run import Memory, Run
-from render.scene.shape import Box
+from render.scene.shape import Box, Sphere
 from render.world.placed import PlacedLaser
 from tests.render.laser_indirect.test_integrator import setting
 from tests.render.laser_indirect.test_manifold_walk import (
@@ -39,12 +40,16 @@ BROAD = paper_laser(sheet=Divergence(full_angle=0.012))
 SIDE_WINDOW = moved(primitive_mesh(Box(size_x=0.08, size_y=0.3, size_z=THICKNESS)), (0.17, 0.0, 0.12))
 MIRROR_STRIP = moved(primitive_mesh(Box(size_x=0.05, size_y=0.1, size_z=0.01)), (0.05, 0.02, 0.7), (0.0, 0.6, 0.0))
 
+FACETED_BALL = moved(primitive_mesh(Sphere(radius=0.03, segments=96)), (0.01, 0.0, 0.8))
+"""Its facets are narrower than what lies between the rays that first look for chains."""
+
 LIT = {
     **SCENES,
     "a window before the laser": ([WALL, SIDE_WINDOW], [GREY, GLASS]),
     "a mirror in the sheet": ([WALL, MIRROR_STRIP], [GREY, Conductor(roughness=0.0)]),
+    "a ball of facets": ([WALL, FACETED_BALL], [GREY, GLASS]),
 }
-QUICK = ("a window before the laser", "a mirror in the sheet", "a mirror behind a window")
+QUICK = ("a window before the laser", "a mirror in the sheet", "a mirror behind a window", "a ball of facets")
 """Those that random paths bring within seconds."""
 
 
@@ -98,6 +103,24 @@ def test_a_line_through_the_lasers_own_window_lies_and_shines_as_snell_and_fresn
     along_fan = reach / (reach - THICKNESS / math.cos(angle) + THICKNESS / (1.5 * math.cos(inside)))
     share = (1 - fresnel(angle, inside)) ** 2
     assert profile[near].sum() / bare == pytest.approx(share * along_fan, rel=2e-3)
+
+
+def test_most_of_the_light_through_facets_narrower_than_the_first_grid_is_listed(monkeypatch):
+    """By light paths through them, which know whether their chain is listed."""
+    _, parts = setting(*LIT["a ball of facets"], camera=paper_camera(0.05), laser=BROAD)
+    task, sampling, camera = pass_of(parts)
+    monkeypatch.setattr(specular_chains, "NARROW", 0)
+    coarse, _, _ = pass_of(parts)
+    listed, power = [], []
+    for part in (task, coarse):
+        buffer = empty_buffer(camera.width * camera.height)
+        found = part.trace_light_paths(5, 0, sampling.light_paths, sampling, buffer, True)
+        paths = np.concatenate([paths for _, _, paths in found])
+        over = paths[paths["all_specular"] & paths["after_specular"]]
+        listed.append(float(over["throughput"][over["walked"]].sum()))
+        power.append(float(over["throughput"].sum()))
+    assert power[0] == power[1] > 0.0
+    assert listed[1] < 0.5 * listed[0] and listed[0] > 0.9 * power[0]
 
 
 def test_its_error_is_told():

@@ -18,8 +18,11 @@ from render.run import Run
 from render.sensor.develop import develop, expected_electrons
 from render.world.world import build_world
 from studio.photographs.line_profile import Stretch
-from studio.photographs.twin import Seen, blurred_line, fitted
+from studio.photographs.twin import fitted
+from studio.photographs.twin_light import numbers_of
+from studio.photographs.twin_profile import blurred_line
 from studio.photographs.twin_project import wider
+from studio.photographs.twin_seen import Piece, Seen
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.scan.stages import Clock, render_step, scaled
@@ -96,8 +99,10 @@ def test_a_sheet_that_widens_along_the_line_tells_it_from_the_blur() -> None:
     electrons = 100.0 + 12_000.0 * blurred_line(distance, scale * sheet[:, None], blur**2)
     gain = project.sensor.dn_per_electron
     values = np.rint(gain * rng.poisson(electrons) + project.sensor.black_level)
-    stretch = Stretch(values, distance, np.zeros(count), np.arange(count))
-    found = fitted(project, Seen([stretch], [sheet], [np.zeros(count)], 2.0, None, facing=False))
+    zeros, rows = np.zeros(count), np.arange(count)
+    stretch = Stretch(values, distance, zeros, rows, zeros.astype(np.intp))
+    piece = Piece(stretch, sheet, zeros, np.ones(count), -distance[:, half])
+    found = fitted(project, Seen([piece], 2.0, None, facing=False), numbers_of(project, 0)).twin
     assert not found.blur_px.why and found.blur_px.value == pytest.approx(blur, rel=0.1)
     assert found.scale.value == pytest.approx(scale, rel=0.05)
     assert found.gain.value == pytest.approx(gain, rel=0.1)
