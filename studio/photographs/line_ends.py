@@ -38,10 +38,12 @@ SURELY = 1.0
 SURE = 3
 """Scan lines one after the other that are the line's: there it begins; fewer between two jumps are no piece of it."""
 SOFTER, DIMMER, RUNNING = 1.5, 1.0 / 3.0, 7
-"""Width and amplitude over those of the line next to it, from which light is scattered; their running medians."""
+"""Width and light over those of the line next to it, from which light is scattered; their running medians."""
 FAINT, BLURRED, SLOWLY = 0.2, 0.84, 1.5
 """Of the light next to it, from which a fading end is looked at; widths of the line on which blur falls from half of
 the light to there; times these scan lines, and one more, beyond which it fades of itself."""
+ONE_WIDTH_IN = 0.84
+"""Of its light, at one width of the line from its end: the least that blur no wider than that leaves of it there."""
 JUMP = 3.0
 """Widths from one scan line to the next at which a piece of the line ends."""
 
@@ -120,7 +122,7 @@ def _scattered(found: _Found) -> NDArray[np.bool_]:
     out = np.zeros(len(found.rows), np.bool_)
     if len(found.rows) <= RUNNING:
         return out
-    width, light = (median_filter(values, RUNNING, mode="nearest") for values in (found.width, found.amplitude))
+    width, light = (median_filter(values, RUNNING, mode="nearest") for values in (found.width, found.light))
     soft = width > SOFTER * np.median(found.width[found.amplitude >= np.median(found.amplitude)])
     at = np.flatnonzero(soft)
     for run in np.split(at, np.flatnonzero(np.diff(at) > 1) + 1):
@@ -132,7 +134,7 @@ def _scattered(found: _Found) -> NDArray[np.bool_]:
             np.flatnonzero(~soft & (found.rows > last) & (found.rows <= last + NEXT)),
         )
         # the line's own end fades among the scan lines beside
-        beside = [float(np.quantile(found.amplitude[side], 0.75)) for side in sides if len(side) >= SURE]
+        beside = [float(np.quantile(found.light[side], 0.75)) for side in sides if len(side) >= SURE]
         saturated = found.saturated[run].any()
         if beside and not saturated and np.median(light[run]) < DIMMER * min(beside):
             out[run] = True
@@ -165,7 +167,7 @@ def _first(found: _Found, inward: NDArray[np.intp]) -> int:
     there, on, surely = [], [], []
     for k in range(NEXT + SURE):
         at, inside = inward[k], inward[k + 1 : k + 1 + NEXT]
-        usual = found.usual_light(inside)
+        usual = min(found.usual_light(inside), _one_width_in(found, inside))
         bends = np.abs(np.diff(found.light[inside], 2))
         scatter = 1.4826 * float(np.median(bends)) / 6.0**0.5 / max(usual, 1e-300)
         asked = min(HALF * (1.0 + SURELY * scatter), 0.5 * (1.0 + HALF))
@@ -177,6 +179,16 @@ def _first(found: _Found, inward: NDArray[np.intp]) -> int:
     likely = [k for k in range(NEXT) if on[k]] if begins else []
     first = next((k for k in begins if surely[k]), likely[0] if likely else 0)
     return _fades_from(found, inward, first)
+
+
+def _one_width_in(found: _Found, inside: NDArray[np.intp]) -> float:
+    """The light of a line whose end is blurred, by the light one of its widths inward: blur is no wider than the line.
+
+    What is brighter still beyond, as a glossy surface may be, tells nothing of the end.
+    """
+    width = float(np.median(found.width[inside]))
+    at = min(int(np.ceil(width)), len(inside)) - 1
+    return found.usual_light(inside[max(at - at // 2, 0) : at + at // 2 + 1]) / ONE_WIDTH_IN
 
 
 def _fades_from(found: _Found, inward: NDArray[np.intp], first: int) -> int:

@@ -17,7 +17,7 @@ from analysis.line.extract import extract
 from analysis.line.result import Flag, Line
 from analysis.line.selection.continuity import GAP, select_chain
 from analysis.line.settings import ExtractionSettings
-from studio.photographs.line_ends import NEXT, alike
+from studio.photographs.line_ends import NEXT, SOFTER, alike
 
 BESIDE, SPARE = 8.0, 12.0
 """Widths of the line, and px, beside it that are looked at: enough to tell its ground by."""
@@ -59,9 +59,10 @@ def looked_at_again(
 
 
 def _is_alike(found: Line, i: int, chain: Line, beside: NDArray[np.intp]) -> bool:
-    """Whether what was found on a scan line is as bright and as wide as the line is on those beside it."""
-    width, amplitude = float(found.width[i, 0]), float(found.amplitude[i, 0])
-    return alike(width, amplitude, chain.width[beside, 0], float(np.median(chain.amplitude[beside, 0])))
+    """Whether what was found on a scan line is as bright and as sharp as the line is on those beside it."""
+    width, amplitude, widths = float(found.width[i, 0]), float(found.amplitude[i, 0]), chain.width[beside, 0]
+    sharp = width <= SOFTER * float(np.median(widths))
+    return sharp and alike(width, amplitude, widths, float(np.median(chain.amplitude[beside, 0])))
 
 
 def _beside(line: Line, rows: NDArray[np.intp], more: Line) -> Line:

@@ -80,6 +80,26 @@ def test_what_is_scattered_beside_the_line_is_none_of_it_however_long() -> None:
             assert kept[~there].mean() > 0.97
 
 
+def test_scattered_light_is_dim_by_its_light_not_by_its_number() -> None:
+    """At half of the number a picture for the eye shows a quarter of the light."""
+    rows = np.arange(COUNT)
+    light, width = np.where(rows < 140, 160.0, 80.0), np.where(rows < 140, 2.0, 5.0)
+    line = line_of(light, width=width)
+    assert ended(line).valid[140:].all()
+    assert not ended(line, Tone(gain=1.0, black=0.0)).valid[140:].any()
+
+
+def test_a_line_that_grows_brighter_inward_ends_by_the_light_at_its_end() -> None:
+    """A glossy surface is four times as bright 8 scan lines in, which says nothing of the light at its end."""
+    rows = np.arange(COUNT)
+    sharp = np.where((rows >= FIRST) & (rows <= LAST), 100.0, 0.0)
+    sharp *= np.where(rows < FIRST + 8, 1.0, 4.0)
+    for blur in (0.7, 1.5):
+        kept = np.flatnonzero(ended(line_of(gaussian_filter1d(sharp, blur))).valid[:, 0])
+        # bends of what grows brighter are taken for scatter, and half of the light is asked for as surely
+        assert FIRST <= kept[0] <= FIRST + 1 and kept[1:].tolist() == list(range(kept[0] + 1, LAST + 1))
+
+
 def test_a_short_piece_far_off_is_the_line_only_if_it_is_as_bright() -> None:
     for light, stays in ((20.0, False), (150.0, True)):
         amplitude, u = np.full(COUNT, 200.0), np.full(COUNT, 50.0)

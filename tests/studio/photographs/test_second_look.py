@@ -16,13 +16,16 @@ COUNT, WIDTH, SHADOW = 120, 400, slice(56, 63)
 NOISE = NoiseModel(gain=0.1, read_noise=10.0)
 
 
-def image(lit: float) -> np.ndarray:
-    """A line of 60 DN on ground of 100 DN, that falls to 30 DN about the line on the scan lines of the shadow."""
+def image(lit: float, softer: float = 1.0) -> np.ndarray:
+    """A line of 60 DN on ground of 100 DN, that falls to 30 DN about the line on the scan lines of the shadow; there it
+    is `lit` times as bright and `softer` times as wide."""
     x, rows = np.arange(WIDTH), np.arange(COUNT)
     ground = np.full((COUNT, WIDTH), 100.0)
     ground[SHADOW, 170:260] = 30.0
     place = 200.0 + 0.2 * rows
-    line = 60.0 * np.exp(-0.5 * ((x - place[:, None]) / 1.5) ** 2)
+    width = np.full((COUNT, 1), 1.5)
+    width[SHADOW] *= softer
+    line = 60.0 * np.exp(-0.5 * ((x - place[:, None]) / width) ** 2)
     line[SHADOW] *= lit
     noisy = ground + line + np.random.default_rng(4).normal(0.0, 1.0, ground.shape)
     return np.rint(noisy).astype(np.uint8)
@@ -42,8 +45,9 @@ def test_what_the_ground_of_the_whole_image_hides_is_found(axis: str) -> None:
     assert np.abs(error).max() < 5.0 * chain.sigma_u[SHADOW, 0].max() < 0.5
 
 
-def test_what_is_much_dimmer_than_the_line_beside_is_none_of_it() -> None:
-    taken = image(0.4)
+@pytest.mark.parametrize(("lit", "softer"), [(0.4, 1.0), (0.8, 2.2)])
+def test_what_is_much_dimmer_or_softer_than_the_line_beside_is_none_of_it(lit: float, softer: float) -> None:
+    taken = image(lit, softer)
     settings = ExtractionSettings(select="strongest", peaks=5)
     again = looked_at_again(extract(taken, settings=settings, noise=NOISE), taken, settings, NOISE, judged=False)
     assert (again.flag[SHADOW, -1] == Flag.REJECTED).all() and np.isnan(again.u[SHADOW, -1]).all()
