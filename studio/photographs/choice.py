@@ -15,7 +15,7 @@ from analysis.line.settings import ExtractionSettings
 from studio.photographs.completion import completed, offered, without_detours
 from studio.photographs.detours import without_detours_of
 from studio.photographs.line_arrays import changed, column, side_by_side
-from studio.photographs.line_ends import ended
+from studio.photographs.line_ends import Tone, ended
 
 
 def selected(candidates: Line, settings: ExtractionSettings, volume: WorkingVolume | None) -> Line:
@@ -33,7 +33,7 @@ def selected(candidates: Line, settings: ExtractionSettings, volume: WorkingVolu
 
 
 def carried_on(
-    candidates: Line, centres: Line, settings: ExtractionSettings, volume: WorkingVolume | None, half: float
+    candidates: Line, centres: Line, settings: ExtractionSettings, volume: WorkingVolume | None, tone: Tone | None
 ) -> Line:
     """Peaks (n, k) by a fit, and centres (n, peaks) of the strongest -> the lines (n, peaks), without what is past
     their ends, with centres where a fit fails.
@@ -41,7 +41,7 @@ def carried_on(
     chosen = selected(offered(candidates, centres), settings, volume)
     fitted = without_detours(selected(candidates, settings, volume), chosen)
     lines = [column(fitted, k) for k in range(settings.peaks)]
-    return side_by_side([completed(ended(one, half), _nearest(centres, one)) for one in lines], candidates)
+    return side_by_side([completed(ended(one, tone), _nearest(centres, one)) for one in lines], candidates)
 
 
 def _nearest(centres: Line, line: Line) -> Line:

@@ -56,8 +56,9 @@ def offered(candidates: Line, centres: Line) -> Line:
 
 
 def without_detours(line: Line, chosen: Line) -> Line:
-    """The lines (n, k) of fits without what is not `chosen` when the centres are offered as well."""
-    detour = (chosen.u != line.u) & line.valid
+    """The lines (n, k) of fits without what is not on the line `chosen` when the centres are offered as well."""
+    # a centre beside a fit of the same light is no other line
+    detour = ~(np.abs(chosen.u - line.u) <= BEND * line.width) & line.valid
     flag = np.where(detour, np.uint8(Flag.REJECTED), line.flag).astype(np.uint8)
     return replace(line, u=np.where(detour, np.nan, line.u), flag=flag)
 

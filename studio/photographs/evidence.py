@@ -135,6 +135,8 @@ class Evidence:
     """By axis, of the combination that shows the line best: its score, or that of a second line that hides it."""
     light: dict[Colour, float] | None = None
     """Of the line's light, each channel's share; None: nothing told it, or the colour was given."""
+    clear: dict[str, float] | None = None
+    """By combination, along the axis: what was chosen by, as `clearest` has it; None: the scores."""
 
     @property
     def score(self) -> float:
@@ -174,15 +176,22 @@ def find_evidence(
     map_chunks(look, len(tried), 1)
     means = iter(found.reshape(-1, len(shrunk)).mean(axis=1).tolist())
     scores: dict[Axis, dict[str, float]] = {way: {one.name: next(means) for one in allowed} for way in AXES}
-    best_of = {way: _simplest_of_best(allowed, scores[way]) for way in AXES}
-    clearest = {way: _clearest(shrunk, best_of[way], way, max(scores[way].values())) for way in AXES}
+    clear = scores
+    if max(max(one.values()) for one in scores.values()) < SECOND:
+        # where two lines hide each other, which combination is the clearest is chance
+        clear = {way: {c.name: _clearest(shrunk, c, way, scores[way][c.name]) for c in allowed} for way in AXES}
+    best_of = {way: _simplest_of_best(allowed, clear[way]) for way in AXES}
+    clearest = {way: _clearest(shrunk, best_of[way], way, max(clear[way].values())) for way in AXES}
     best_axis = axis if axis is not None else max(AXES, key=lambda way: clearest[way])
     best = best_of[best_axis]
     both = [chains_of(one, best, best_axis, 2) for one in shrunk]
-    lines = [pair[0] for pair in both]
+    # of two lines that hide each other the first is clear nowhere
+    lines = [max(pair, key=lambda chain: np.isfinite(chain.u).sum()) for pair in both]
     light = None if mono or colour is not None else _light_of(shrunk, lines, best_axis)
     seen = best.colour if light is None else _colour_of(light, best)
-    return Evidence(best_axis, best, scores, tuple((pair[0], pair[1]) for pair in both), seen, clearest, light)
+    return Evidence(
+        best_axis, best, scores, tuple((pair[0], pair[1]) for pair in both), seen, clearest, light, clear[best_axis]
+    )
 
 
 def _simplest_of_best(allowed: Sequence[Combination], scores: dict[str, float]) -> Combination:

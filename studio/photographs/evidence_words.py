@@ -52,7 +52,7 @@ def told_of(evidence: Evidence, words: Words = OPTIONS) -> list[tuple[str, str]]
     """(what, choice and reason)."""
     axis = evidence.axis
     axis_reason = ", ".join(f"{name} {score:.2f}" for name, score in evidence.clearest.items())
-    by_name = evidence.scores[axis]
+    by_name = evidence.clear or evidence.scores[axis]
     ranked = sorted(by_name.items(), key=lambda item: -item[1])[:4]
     reason = ", ".join(f"{name} {score:.2f}" for name, score in ranked) if len(by_name) > 1 else "given"
     found = [

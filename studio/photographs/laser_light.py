@@ -7,6 +7,7 @@ that scatters least about a smooth line, within the band that the colour selects
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import cv2
@@ -87,6 +88,19 @@ def _less(image: NDArray[Any], off: NDArray[Any] | None, full: float | None) -> 
     return Light(*subtract_off(image, off, full))
 
 
+@dataclass(frozen=True)
+class Tried:
+    """What a channel makes of a line."""
+
+    scatter: float
+    """px, about a smooth line; inf: too few positions."""
+    found: int
+    width: float
+    """px."""
+    height: float
+    """DN."""
+
+
 def channels_to_try(colour: Colour, difference: bool, lossy: bool) -> tuple[Channel, ...]:
     """Which may measure, the one with the least foreign light first."""
     whole: Channel = "luminance" if lossy else "mono"
@@ -105,14 +119,11 @@ def scatter_of(
     colour: Colour,
     axis: Axis,
     lossy: bool,
-) -> tuple[float, int]:
-    """How far positions measured in a channel scatter about a smooth line, px, and how many were found.
-
-    Upright pieces of the image about the chain are measured; inf: too few.
-    """
+) -> Tried:
+    """What a channel makes of a line: upright pieces of the image about its chain are measured."""
     pieces = _pieces(image, off, chain, axis)
     if pieces is None:
-        return np.inf, 0
+        return Tried(np.inf, 0, 1.0, 1.0)
     some, some_off, near = pieces
     light = laser_light(some, some_off, channel, colour, full_scale(some, lossy))
     steps = np.abs(np.diff(light.image.astype(np.float32), axis=1))
@@ -127,9 +138,9 @@ def scatter_of(
     u = np.where(on, line.u[:, 0], np.nan).reshape(-1, RUN)
     bends = u[:, : -2 * LAG] - 2.0 * u[:, LAG:-LAG] + u[:, 2 * LAG :]
     bends = np.abs(bends[np.isfinite(bends)])
-    if len(bends) < RUN // 2:
-        return np.inf, int(np.isfinite(u).sum())
-    return 1.4826 * float(np.median(bends)) / 6.0**0.5, int(np.isfinite(u).sum())
+    scatter = 1.4826 * float(np.median(bends)) / 6.0**0.5 if len(bends) >= RUN // 2 else np.inf
+    width, height = (float(np.median(some[on, 0])) if on.any() else 1.0 for some in (line.width, line.amplitude))
+    return Tried(scatter, int(np.isfinite(u).sum()), width, gain * height)
 
 
 def _pieces(

@@ -32,7 +32,7 @@ from studio.photographs.evidence import (
 from studio.photographs.evidence_words import OPTIONS, Words, told_of, warnings_of
 from studio.photographs.image_files import Photograph, load_photograph, read_photograph
 from studio.photographs.laser_light import ALL_FOUND, MOST_FOUND, TIE, Channel, channels_to_try, scatter_of
-from studio.photographs.mosaic import filled_in
+from studio.photographs.mosaic import moved_by
 from studio.photographs.off_images import pair_offs
 from studio.photographs.region import Region
 
@@ -220,12 +220,12 @@ def _measuring(seen: Sequence[Seen], evidence: Evidence, wished: Channel | None)
     counts = dict.fromkeys(names, 0)
     for one, line in sorted(coloured, key=lambda pair: -pair[1].score)[:TRIED]:
         for name in names:
-            scatter, found = scatter_of(one.image, one.off, line, name, evidence.colour, evidence.axis, one.lossy)
-            scatters[name].append(scatter)
-            counts[name] += found
-    # what a mosaic moves all scan lines by makes none of them scatter
-    mosaic = {name: filled_in(name, evidence.colour) if lossy else 0.0 for name in names}
-    typical = {name: math.hypot(float(np.median(scatters[name])), mosaic[name]) for name in names}
+            tried = scatter_of(one.image, one.off, line, name, evidence.colour, evidence.axis, one.lossy)
+            # what a mosaic moves all scan lines by makes none of them scatter
+            moved = float(moved_by(name, tried.width, tried.height)) if lossy else 0.0
+            scatters[name].append(math.hypot(tried.scatter, moved))
+            counts[name] += tried.found
+    typical = {name: float(np.median(scatters[name])) for name in names}
     # another colour has only what is left over of the light, and must see as good as all of it
     own = ALL_FOUND * counts.get(evidence.colour, 0)
     least_found = {name: own if name in COLOURS and name != evidence.colour else 1 for name in names}

@@ -36,10 +36,11 @@ from studio.photographs.image_files import Photograph
 from studio.photographs.laser_light import full_scale, laser_light
 from studio.photographs.light import Light, without
 from studio.photographs.line_arrays import changed, column
-from studio.photographs.line_ends import HALF, TONED, ended
+from studio.photographs.line_ends import Tone, ended
 from studio.photographs.mosaic import with_mosaic
 from studio.photographs.photograph_set import Look
 from studio.photographs.pieces import NO_LINE, lines_only
+from studio.photographs.second_look import looked_at_again
 from studio.scan.line_extraction import note_of
 
 GAIN_ROUNDS = 5
@@ -147,17 +148,21 @@ def _measured(
     noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy, threads=threads)
     alone = settings.select == "strongest" and volume is None
     # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
-    half = TONED if taken.lossy else HALF
     shared = noise.alike or whole.ndim == 3 or taken.lossy
     noise = noise.model_copy(update={"alike": shared})
     # where a camera has shaped the profile, no line is a Gaussian, and what some scan lines are taken for, one line
     # or two, would move them against the others
     judged = not shared
+    # of a difference nobody knows where on its curve it is
+    coded = taken.lossy and off is None and look.channel != "difference"
+    tone = Tone(noise.gain, noise.black_level) if coded else None
     if alone:
         line = extract(light.image, settings=settings, noise=noise, threads=threads, shared=False, judged=judged)
     else:
         every = volume is not None
         line = peaks_to_choose_from(light.image, settings, noise, threads, every=every, judged=judged)
+        if settings.select == "continuous" and settings.peaks == 1 and volume is None:
+            line = looked_at_again(line, light.image, settings, noise, judged)
     line = placed(unsure_dropped(line), whole.shape, corner)
     fits = settings.select == "continuous" and settings.method in FITS
     if fits and np.isin(line.flag[:, : settings.peaks], FILLED).any():
@@ -167,18 +172,17 @@ def _measured(
         if settings.peaks == 1 and look.settings.pattern is None:
             around = whole_light(light.image, corner, whole.shape)
             centres = with_half_heights(centres, column(line, 0), around, noise.gain)
-        line = carried_on(line, centres, settings, volume, half)
+        line = carried_on(line, centres, settings, volume, tone)
     elif not alone:
         line = selected(line, settings, volume)
     if settings.select == "continuous":
-        found = ended(line, half)
+        found = ended(line, tone)
         line = lines_only(found)
         if found.valid.any() and not line.valid.any():
             return Measured(no_line(whole.shape, settings, NO_LINE), whole, light.image, corner, noise)
     line = _no_wider(with_shared_noise(line), line) if shared else line
     line = smooth_along(line) if look.settings.smooth_along else line
-    colour = "mono" if look.evidence is None else look.evidence.colour
-    line = with_mosaic(line, look.channel, colour) if taken.lossy else line
+    line = with_mosaic(line, look.channel, noise.gain) if taken.lossy else line
     return Measured(replace(line, note=note_of(line, settings, [])), whole, light.image, corner, noise)
 
 

@@ -29,7 +29,7 @@ def ridge_peaks(
         bent = -(scale**1.5) * cv2.Sobel(smooth, cv2.CV_32F, 2, 0, ksize=1, borderType=cv2.BORDER_REPLICATE)
         # an edge is bent as well, but falls to one side only
         np.minimum(bent, FALL / scale**0.5 * _fall(smooth, round(FAR * scale)), out=bent)
-        widest[bent > response] = scale
+        np.copyto(widest, scale, where=bent > response)
         np.maximum(response, bent, out=response)
     if closed is not None:
         response[cv2.dilate(closed.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = 0.0
@@ -50,9 +50,8 @@ def ridge_peaks(
 def _fall(smooth: Floats, far: int) -> Floats:
     """How far each pixel (n, w) is above both of those so far to its left and right; beyond the image it is level."""
     width = smooth.shape[1]
-    places = np.arange(width)
-    left, right = smooth[:, np.maximum(places - far, 0)], smooth[:, np.minimum(places + far, width - 1)]
-    return np.asarray(smooth - np.maximum(left, right))
+    wider = cv2.copyMakeBorder(smooth, 0, 0, far, far, cv2.BORDER_REPLICATE)
+    return np.asarray(smooth - np.maximum(wider[:, :width], wider[:, 2 * far :]))
 
 
 def _flanks(order: NDArray[np.intp], strength: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.bool_]:

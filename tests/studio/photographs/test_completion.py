@@ -128,7 +128,7 @@ def test_each_of_two_lines_is_carried_on_by_its_own_centres() -> None:
         return replace(line, **{name: np.where(swap, values[:, ::-1], values) for name, values in pairs.items()})
 
     candidates = two(without(fits, lost, Flag.NOT_CONVERGED), without(fits, lost + 1, Flag.NOT_CONVERGED))
-    found = carried_on(candidates, two(centres, centres), settings, None, 0.5)
+    found = carried_on(candidates, two(centres, centres), settings, None, None)
     assert found.u.shape == (COUNT, 2) and found.valid.mean() > 0.99
     order = np.sort(found.u, axis=1) - np.stack([truth, truth + 80.0], axis=1)
     assert np.nanmax(np.abs(order)) < 6.0 * SCATTER

@@ -68,6 +68,20 @@ def test_two_lines_that_are_alike_hide_neither_themselves_nor_which_way_they_run
         assert (evidence.axis, evidence.lines) == (axis, 2) and not warnings_of(evidence)
 
 
+def test_what_is_weak_elsewhere_says_nothing_of_two_lines_that_hide_each_other() -> None:
+    """The edge of a bluish wall stands as clear of all else in its colour as two green lines do of each other."""
+    _, x = np.mgrid[0:360, 0:480].astype(np.float64)
+    lines = sum(np.exp(-0.5 * ((x - at) / 1.5) ** 2) for at in (190.0, 310.0))
+    wall = 3.0 * np.exp(-0.5 * ((x - 420.0) / 2.0) ** 2)
+    for seed in range(5):
+        noise = np.random.default_rng(seed).normal(size=(*x.shape, 3))
+        image = np.stack([30.0 + 20.0 * lines, 30.0 + 100.0 * lines, 30.0 + 40.0 * lines + wall], axis=2) + noise
+        evidence = find_evidence([shrink(np.rint(image).astype(np.uint8), None)])
+        assert (evidence.axis, evidence.lines, evidence.colour) == ("rows", 2, "green")
+        told = dict(told_of(evidence))
+        assert "as clear as that" in told["looked for in"] or told["looked for in"].startswith("green")
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_colour_and_axis_are_told_by_the_photograph_and_the_line_is_found(name: str, tmp_path: Path) -> None:
     scene, quality = SCENES[name]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from analysis.line.result import Flag, Line
-from studio.photographs.line_ends import TONED, ended
+from studio.photographs.line_ends import GAMMA, Tone, ended
 
 COUNT, FIRST, LAST = 200, 40, 159
 
@@ -78,6 +80,26 @@ def test_what_is_scattered_beside_the_line_is_none_of_it_however_long() -> None:
             assert kept[~there].mean() > 0.97
 
 
+def test_scattered_light_is_dim_by_its_light_not_by_its_number() -> None:
+    """At half of the number a picture for the eye shows a quarter of the light."""
+    rows = np.arange(COUNT)
+    light, width = np.where(rows < 140, 160.0, 80.0), np.where(rows < 140, 2.0, 5.0)
+    line = line_of(light, width=width)
+    assert ended(line).valid[140:].all()
+    assert not ended(line, Tone(gain=1.0, black=0.0)).valid[140:].any()
+
+
+def test_a_line_that_grows_brighter_inward_ends_by_the_light_at_its_end() -> None:
+    """A glossy surface is four times as bright 8 scan lines in, which says nothing of the light at its end."""
+    rows = np.arange(COUNT)
+    sharp = np.where((rows >= FIRST) & (rows <= LAST), 100.0, 0.0)
+    sharp *= np.where(rows < FIRST + 8, 1.0, 4.0)
+    for blur in (0.7, 1.5):
+        kept = np.flatnonzero(ended(line_of(gaussian_filter1d(sharp, blur))).valid[:, 0])
+        # bends of what grows brighter are taken for scatter, and half of the light is asked for as surely
+        assert FIRST <= kept[0] <= FIRST + 1 and kept[1:].tolist() == list(range(kept[0] + 1, LAST + 1))
+
+
 def test_a_short_piece_far_off_is_the_line_only_if_it_is_as_bright() -> None:
     for light, stays in ((20.0, False), (150.0, True)):
         amplitude, u = np.full(COUNT, 200.0), np.full(COUNT, 50.0)
@@ -86,13 +108,40 @@ def test_a_short_piece_far_off_is_the_line_only_if_it_is_as_bright() -> None:
         assert bool(ended(line_of(amplitude, u)).valid[155:165].all()) is stays
 
 
-def test_a_tone_curve_shows_half_of_the_light_at_more_than_half_of_the_number() -> None:
+def test_half_of_the_light_is_found_by_the_tone_curve_and_the_ground_that_it_lies_on() -> None:
     sharp = np.zeros(COUNT)
     sharp[FIRST : LAST + 1] = 1.0
-    shown = 200.0 * np.maximum(gaussian_filter1d(sharp, 1.5), 1e-6) ** (1.0 / 1.5)
-    line = line_of(shown)
-    assert np.flatnonzero(ended(line, TONED).valid[:, 0]).tolist() == list(range(FIRST, LAST + 1))
-    assert ended(line).valid.sum() > LAST - FIRST + 1
+    light = np.maximum(gaussian_filter1d(sharp, 1.5), 1e-9)
+    gain, black = 0.5, 20.0
+    for ground in (0.0, 0.05, 0.5):
+        level = 255.0 * ground ** (1.0 / GAMMA)
+        shown = (255.0 * (ground + 0.4 * light) ** (1.0 / GAMMA) - level) / gain
+        line = line_of(shown)
+        line = replace(line, background=np.where(line.valid, (level - black) / gain, np.nan))
+        kept = ended(line, Tone(gain, black)).valid[:, 0]
+        assert np.flatnonzero(kept).tolist() == list(range(FIRST, LAST + 1)), ground
+        if ground < 0.5:  # by numbers blur would be a part of the line
+            assert ended(line).valid.sum() > LAST - FIRST + 1
+
+
+def test_one_wing_that_tells_too_little_does_not_make_the_line_as_dim_as_its_blur() -> None:
+    sharp = np.zeros(COUNT)
+    sharp[FIRST : LAST + 1] = 400.0
+    line = line_of(gaussian_filter1d(sharp, 1.5))
+    line.flag[100] = Flag.SATURATED
+    line.amplitude[100] = 150.0
+    assert np.flatnonzero(ended(line).valid[:, 0]).tolist() == list(range(FIRST, LAST + 1))
+
+
+def test_blur_of_a_clipped_line_is_weighed_against_what_its_wings_tell() -> None:
+    sharp = np.zeros(COUNT)
+    sharp[FIRST : LAST + 1] = 2000.0
+    light = gaussian_filter1d(sharp, 0.7)
+    line = line_of(light)
+    line.flag[light > 500.0] = Flag.SATURATED
+    line.amplitude[FIRST + 7] = 500.0  # one wing that tells no more than what clips
+    assert light[FIRST - 1] > 0.5 * 500.0
+    assert np.flatnonzero(ended(line).valid[:, 0]).tolist() == list(range(FIRST, LAST + 1))
 
 
 def test_a_scan_line_at_an_end_is_the_line_only_where_the_line_goes_on_to() -> None:
