@@ -116,8 +116,10 @@ def image_saturation(image: NDArray[Any]) -> float | None:
     lowest = image.min()
     if at_top < PILE or lowest == image.max():
         return None
-    # of whole numbers it mostly is the next
-    next_lower = 0 if image.dtype.kind == "f" else np.count_nonzero(image == int(highest) - 1)
-    if next_lower == 0:
-        next_lower = np.count_nonzero(image == np.where(image < highest, image, lowest).max())
+    if image.dtype.kind == "u":  # what is below the highest wraps, the highest becomes 0
+        wrapped = int(np.subtract(image, image.max()).max())
+        lower: Any = wrapped + int(highest) - int(np.iinfo(image.dtype).max) - 1
+    else:
+        lower = np.where(image < highest, image, lowest).max()
+    next_lower = np.count_nonzero(image == lower)
     return highest if at_top > STEEP * next_lower else None
