@@ -23,7 +23,7 @@ from analysis.line.detection.noise import image_saturation
 from analysis.line.result import Axis
 from analysis.line.selection.continuity import cheapest_chain
 from render.base.threads import map_chunks
-from studio.photographs.ridge_peaks import SCALES, Floats, ridge_peaks
+from studio.photographs.ridge_peaks import SCALES, Floats, Ridges, ridge_peaks
 
 Colour = Literal["mono", "red", "green", "blue"]
 
@@ -167,11 +167,17 @@ def find_evidence(
     allowed = allowed[:1] if mono else allowed
     tried = [(way, combination, one) for way in AXES for combination in allowed for one in shrunk]
     found = np.zeros(len(tried))
+    ridges: dict[tuple[Axis, Combination, int], Ridges] = {}
 
     def look(start: int, stop: int) -> None:
         for k in range(start, stop):
             way, combination, one = tried[k]
-            found[k] = score_of(one, combination, way)
+            ridges[way, combination, k % len(shrunk)] = seen = _ridges(one, combination, way)
+            found[k] = score_of(seen)
+
+    def lines_of(combination: Combination, way: Axis) -> list[list[Chain]]:
+        """Of each image the two clearest."""
+        return [_chains(ridges[way, combination, i], one.factor, 2) for i, one in enumerate(shrunk)]
 
     map_chunks(look, len(tried), 1)
     means = iter(found.reshape(-1, len(shrunk)).mean(axis=1).tolist())
@@ -179,12 +185,12 @@ def find_evidence(
     clear = scores
     if max(max(one.values()) for one in scores.values()) < SECOND:
         # where two lines hide each other, which combination is the clearest is chance
-        clear = {way: {c.name: _clearest(shrunk, c, way, scores[way][c.name]) for c in allowed} for way in AXES}
+        clear = {way: {c.name: _clearest(lines_of(c, way), scores[way][c.name]) for c in allowed} for way in AXES}
     best_of = {way: _simplest_of_best(allowed, clear[way]) for way in AXES}
-    clearest = {way: _clearest(shrunk, best_of[way], way, max(clear[way].values())) for way in AXES}
+    clearest = {way: _clearest(lines_of(best_of[way], way), max(clear[way].values())) for way in AXES}
     best_axis = axis if axis is not None else max(AXES, key=lambda way: clearest[way])
     best = best_of[best_axis]
-    both = [chains_of(one, best, best_axis, 2) for one in shrunk]
+    both = lines_of(best, best_axis)
     # of two lines that hide each other the first is clear nowhere
     lines = [max(pair, key=lambda chain: np.isfinite(chain.u).sum()) for pair in both]
     light = None if mono or colour is not None else _light_of(shrunk, lines, best_axis)
@@ -199,11 +205,11 @@ def _simplest_of_best(allowed: Sequence[Combination], scores: dict[str, float]) 
     return next(one for one in allowed if scores[one.name] >= (1.0 - TIE) * highest)
 
 
-def _clearest(shrunk: Sequence[Shrunk], combination: Combination, axis: Axis, score: float) -> float:
+def _clearest(lines: Sequence[Sequence[Chain]], score: float) -> float:
     """Of two lines that are alike each hides how clear the other is: what is left without the first one tells."""
     if score >= SECOND:
         return score
-    second = float(np.mean([chains_of(one, combination, axis, 2)[1].score for one in shrunk]))
+    second = float(np.mean([pair[1].score for pair in lines]))
     return second if second > SECOND else score
 
 
@@ -266,16 +272,21 @@ def brightest(image: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(cv2.max(cv2.max(red, green), blue))
 
 
-def score_of(shrunk: Shrunk, combination: Combination, axis: Axis) -> float:
+def score_of(ridges: Ridges) -> float:
     """How clear the cheapest chain of ridges in a shrunk image stands."""
-    u, strength, scale = _ridges(shrunk, combination, axis)
+    u, strength, scale = ridges
     choice = cheapest_chain(u, strength)
     return _clearness(_at(choice, u), _at(choice, strength), _at(choice, scale), u, strength)[0]
 
 
 def chains_of(shrunk: Shrunk, combination: Combination, axis: Axis, count: int) -> list[Chain]:
     """As many chains of ridges in a shrunk image, far from each other, the cheapest first."""
-    u, strength, scale = _ridges(shrunk, combination, axis)
+    return _chains(_ridges(shrunk, combination, axis), shrunk.factor, count)
+
+
+def _chains(ridges: Ridges, factor: int, count: int) -> list[Chain]:
+    """The same of its ridges, and its size over that of the shrunk image."""
+    u, strength, scale = ridges
     found: list[Chain] = []
     for _ in range(count):
         choice = cheapest_chain(u, strength)
@@ -283,13 +294,11 @@ def chains_of(shrunk: Shrunk, combination: Combination, axis: Axis, count: int) 
         score, clear, off = _clearness(along, p, s, u, strength)
         u, strength = np.where(off, u, np.nan), np.where(off, strength, np.nan)
         along = np.where(_clear_pieces(along, clear), along, np.nan)
-        found.append(Chain((along + 0.5) * shrunk.factor - 0.5, s * shrunk.factor, score))
+        found.append(Chain((along + 0.5) * factor - 0.5, s * factor, score))
     return found
 
 
-def _ridges(
-    shrunk: Shrunk, combination: Combination, axis: Axis
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _ridges(shrunk: Shrunk, combination: Combination, axis: Axis) -> Ridges:
     """`ridge_peaks` of a combination along an axis."""
     light, saturated, closed = combination.of(shrunk.image), shrunk.saturated, shrunk.closed
     if axis == "columns":

@@ -132,7 +132,8 @@ def scatter_of(
     noise = NoiseModel(gain=gain, read_noise=dark / gain, saturation=light.saturation)
     noise = noise.model_copy(update={"alike": True})  # of a photograph's colours
     image = level_beside(light.image.astype(np.float32), [near])
-    line = extract(image, settings=ExtractionSettings(), noise=noise, threads=1, shared=False)
+    # one line or two is not asked, as it is not when the photograph is measured
+    line = extract(image, settings=ExtractionSettings(), noise=noise, threads=1, shared=False, judged=False)
     # in another channel the line may be dark, and what is beside it smooth
     on = line.valid[:, 0] & near.holds(line.u[:, 0])
     u = np.where(on, line.u[:, 0], np.nan).reshape(-1, RUN)

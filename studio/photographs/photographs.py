@@ -379,8 +379,8 @@ def check_light(image: NDArray[Any]) -> None:
         raise InputError(
             "the image is black", found=f"no pixel above {high:g}", cure="expose longer, or turn the laser on"
         )
-    full = image_saturation(image)
-    if full is not None and low >= full:
-        raise InputError("the image is saturated all over", found=f"every pixel at {full:g}", cure="expose less")
     if low == high:
+        full = image_saturation(image)
+        if full is not None:
+            raise InputError("the image is saturated all over", found=f"every pixel at {full:g}", cure="expose less")
         raise InputError("the image is the same everywhere", found=f"every pixel at {high:g}")

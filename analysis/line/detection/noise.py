@@ -98,10 +98,17 @@ class NoiseModel(Model):
         return np.stack([self.table[0], 2.0 * self.table.sum(axis=0) - self.table[0]])
 
 
+def finite_of(image: NDArray[Any]) -> NDArray[Any]:
+    """The numbers of an image that are finite; itself, if all are."""
+    if image.dtype.kind != "f":
+        return image
+    finite = np.isfinite(image)
+    return image if finite.all() else np.asarray(image[finite])
+
+
 def image_saturation(image: NDArray[Any]) -> float | None:
     """The full scale in DN that an image touches, or the number that clips it; None if there is neither."""
-    if image.dtype.kind == "f":
-        image = image[np.isfinite(image)]
+    image = finite_of(image)
     highest = float(image.max())
     if np.issubdtype(image.dtype, np.integer) and int(highest) in FULL_SCALES:
         return highest
@@ -109,5 +116,10 @@ def image_saturation(image: NDArray[Any]) -> float | None:
     lowest = image.min()
     if at_top < PILE or lowest == image.max():
         return None
-    next_lower = np.count_nonzero(image == np.where(image < highest, image, lowest).max())
+    if image.dtype.kind == "u":  # what is below the highest wraps, the highest becomes 0
+        wrapped = int(np.subtract(image, image.max()).max())
+        lower: Any = wrapped + int(highest) - int(np.iinfo(image.dtype).max) - 1
+    else:
+        lower = np.where(image < highest, image, lowest).max()
+    next_lower = np.count_nonzero(image == lower)
     return highest if at_top > STEEP * next_lower else None

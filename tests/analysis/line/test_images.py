@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from analysis.line.detection.noise import NoiseModel
+from analysis.line.detection.noise import NoiseModel, image_saturation
+from analysis.line.estimate import estimate_noise
 from analysis.line.extract import extract
 from analysis.line.result import Flag
 from analysis.line.settings import ExtractionSettings, Method
@@ -231,3 +232,23 @@ def test_likelihood_does_without_smoothing():
     image = slanted(np.random.default_rng(11))[1].astype(np.float32)
     smooth = extract(image, settings=ExtractionSettings(smoothing=3.0), noise=electrons(3))
     np.testing.assert_array_equal(smooth.u, extract(image, noise=electrons(3)).u)
+
+
+def test_numbers_that_are_whole_are_known_for_it_whatever_is_missing_among_them() -> None:
+    rng = np.random.default_rng(3)
+    line = 60.0 * np.exp(-0.5 * ((np.arange(96) - 48.0) / 2.0) ** 2)
+    image = rng.poisson(20.0 + line, (64, 96)).astype(np.float32)
+    image[5, 7], image[9] = np.nan, np.nan
+    assert estimate_noise(image, ExtractionSettings()).step == 1.0
+    image[0, 0] += 0.25
+    assert estimate_noise(image, ExtractionSettings()).step == 0.0
+
+
+def test_what_clips_an_image_is_told_by_the_next_lower_number_that_there_is() -> None:
+    """Whole numbers and others alike, and where numbers below the highest are left out."""
+    steep, gentle = np.full(1000, 50), np.full(1000, 50)
+    steep[:200], steep[200:240] = 180, 170
+    gentle[:200], gentle[200:300] = 180, 179
+    for kind in (np.uint8, np.uint16, np.float32):
+        assert image_saturation(steep.astype(kind)) == 180.0
+        assert image_saturation(gentle.astype(kind)) is None
