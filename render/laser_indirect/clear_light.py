@@ -173,6 +173,15 @@ def integrated(integral: Integral) -> ClearLight:
     return ClearLight(pixels[known], np.maximum(radiance[known], 0.0), error[known], sum(integral.invalid))
 
 
+def _near(pixels: Long, shape: tuple[int, int]) -> Bool:
+    """(h, w) of pixels (n,) and all within SPACING rows and columns of them."""
+    near, (row, column) = np.zeros(shape, np.bool_), np.divmod(pixels, shape[1])
+    for down in range(-SPACING, SPACING + 1):
+        for right in range(-SPACING, SPACING + 1):
+            near[np.clip(row + down, 0, shape[0] - 1), np.clip(column + right, 0, shape[1] - 1)] = True
+    return near
+
+
 def _about(some: Bool, beside: Long) -> Bool:
     """(n,) pixels, and those beside them."""
     return some | np.where(beside >= 0, some[beside], False).any(axis=1)
@@ -208,10 +217,8 @@ class Integral:
         while len(pixels):
             known.ravel()[pixels] = True
             radiance[pixels] = self.sampled(pixels, 1)
-            lit = np.zeros(shape, np.bool_)
-            lit.ravel()[pixels] = radiance[pixels].any(axis=1)
             # what was too thin for the look goes on where it was met
-            pixels = np.flatnonzero(binary_dilation(lit, np.ones((3, 3)), SPACING) & ~known)
+            pixels = np.flatnonzero(_near(pixels[radiance[pixels].any(axis=1)], shape) & ~known)
         pixels = np.flatnonzero(known)
         return pixels, radiance[pixels]
 

@@ -60,6 +60,20 @@ class PassBuffer(NamedTuple):
     """(pixels / BLOCK,) where there may be something in `image` or `camera_radiance`."""
 
 
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def clear_pass(buffer: PassBuffer) -> None:
+    """Zero a pass's buffer, for another."""
+    buffer = borrowed(buffer)
+    for block in range(buffer.touched.shape[0]):
+        if buffer.touched[block]:
+            buffer.image[block * BLOCK : (block + 1) * BLOCK] = 0.0
+            buffer.camera_radiance[block * BLOCK : (block + 1) * BLOCK] = 0.0
+            buffer.touched[block] = False
+    buffer.sums[:] = 0.0
+    buffer.fan_moments[:] = 0.0
+    buffer.invalid[:] = 0.0
+
+
 def empty_connections(n: int) -> Connections:
     """Room for n."""
     return Connections(

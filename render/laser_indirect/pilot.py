@@ -14,6 +14,7 @@ from render.laser.laser import LineLaser
 from render.laser_indirect.accumulator import PASSES_A_WAVE
 from render.laser_indirect.bdpt_pass import BdptPass, Sampling
 from render.laser_indirect.clear_light import ClearLight, clear_light
+from render.laser_indirect.connection_buffer import PassBuffer, clear_pass
 from render.laser_indirect.guiding import active_pixels, allocate_camera_paths, no_guide, reserve_for_specular
 from render.laser_indirect.integrator import (
     LOOK_PATHS,
@@ -95,7 +96,8 @@ def indirect_pilot(
         )
         reserve_for_specular(camera_paths, specular, PILOT_PATHS)
     sampling = Sampling(PILOT_PATHS, fan, camera_paths, active_pixels(camera_paths), guide)
-    found_sums, effect = _pilot_passes(task, clear, sampling, passes, projection, run)
+    buffers = [empty_buffer(len(camera_paths)) for _ in range(passes)]
+    found_sums, effect = _pilot_passes(task, clear, sampling, buffers, projection, run)
     # by bits of kind: none, CAUSTIC, SUBSURFACE_LIGHT, both of them; and SPECULAR_CHAIN
     for interreflection, caustic, subsurface, both, specular_chain in found_sums:
         sums.append((interreflection, caustic, specular_chain, subsurface + both))
@@ -107,26 +109,35 @@ def indirect_pilot(
     present = [name for name, flux in zip(CUMULATIVE_KINDS, mean, strict=True) if flux > 0.0]
     if len(present) <= 1:
         return replace(found, effects={name: effect.most() if name in present else 0.0 for name in CUMULATIVE_KINDS})
-    return replace(found, effects=_effects(task, clear, sampling, passes, effect, run))
+    return replace(found, effects=_effects(task, clear, sampling, buffers, effect, run))
 
 
 def _pilot_passes(
-    task: BdptPass, clear: ClearLight, sampling: Sampling, passes: int, projection: Projection | None, run: Run
+    task: BdptPass,
+    clear: ClearLight,
+    sampling: Sampling,
+    buffers: list[PassBuffer],
+    projection: Projection | None,
+    run: Run,
 ) -> tuple[list[Float], Effect | None]:
-    """Sums (KINDS,) of the light of each pass, and what all of them do to the line. Raises Cancelled."""
-    buffers = [empty_buffer(len(sampling.camera_paths)) for _ in range(passes)]
+    """Sums (KINDS,) of the light of each pass, and what all of them do to the line. The buffers, a pass's each, are
+    zeroed. Raises Cancelled."""
 
     def work(start: int, stop: int) -> None:
         for number in range(start, stop):
             task.run(number, sampling, buffers[number], run.cancelled)
             clear.add_to(buffers[number], task.kinds)
 
-    map_chunks(work, passes, 1, thread_count(run.threads), run.cancelled)
-    return [buffer.sums for buffer in buffers], None if projection is None else Effect.of(projection, buffers)
+    map_chunks(work, len(buffers), 1, thread_count(run.threads), run.cancelled)
+    sums = [buffer.sums.copy() for buffer in buffers]
+    effect = None if projection is None else Effect.of(projection, buffers)
+    for buffer in buffers:
+        clear_pass(buffer)
+    return sums, effect
 
 
 def _effects(
-    task: BdptPass, clear: ClearLight, sampling: Sampling, passes: int, last: Effect, run: Run
+    task: BdptPass, clear: ClearLight, sampling: Sampling, buffers: list[PassBuffer], last: Effect, run: Run
 ) -> dict[str, float]:
     """What each kind of light does to the line, by passes of the same random numbers with ever more kinds.
 
@@ -137,7 +148,7 @@ def _effects(
         specular, with_it = task.specular and bool(kinds & CAUSTIC), last
         if kinds != ALL_KINDS:
             part = replace(task, kinds=kinds, specular=specular)
-            with_it = _pilot_passes(part, clear, sampling, passes, last.projection, run)[1] or last
+            with_it = _pilot_passes(part, clear, sampling, buffers, last.projection, run)[1] or last
         effects[name] = with_it.most(before)
         before = with_it
     return effects
