@@ -69,47 +69,22 @@ NO_SOLUTION = Solution(False, (0.0, 0.0), 0.0)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def turned(surface: Surface, facet: int, o: Vector, d: Vector) -> tuple[bool, Vector, Vector]:
-    """A ray of unit direction on from the plane of a facet (`facets` of `path_vertex.PATH`), as if this had no edge.
-
-    False: it does not come to the plane, or is not refracted there.
-    """
+def facet_plane(surface: Surface, facet: int) -> tuple[Vector, float, float]:
+    """Unit normal of a facet's plane, its distance from the origin along it, and refractive index; 0: it reflects."""
     a0, a1, a2, n0, n1, n2 = plane_of(surface, abs(facet) - 1)
-    normal = (n0, n1, n2)
-    c = -dot(normal, d)
-    s = -dot(normal, minus((a0, a1, a2), o)) / c
-    if not s > 0.0:
-        return False, o, d
-    o = along(o, s, d)
-    if facet < 0:
-        return True, o, plus(d, scaled(2.0 * c, normal))
-    index = surface.rows[surface.object_id[facet - 1], INDEX]
-    eta = index if c > 0.0 else 1.0 / index
-    _, beyond = fresnel_dielectric(abs(c), eta)
-    return beyond > 0.0, o, plus(scaled(1.0 / eta, d), scaled(c / eta - math.copysign(beyond, c), normal))
+    index = surface.rows[surface.object_id[facet - 1], INDEX] if facet > 0 else 0.0
+    return (n0, n1, n2), n0 * a0 + n1 * a1 + n2 * a2, index
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def set_planes(surface: Surface, chain: Record, planes: Float) -> None:
-    """The planes of a chain -> planes (MOST_FACETS, 5): unit normal, distance from the origin along it, and refractive
-    index; 0: it reflects."""
-    for j in range(chain.count):
-        facet = chain.facets[j]
-        a0, a1, a2, n0, n1, n2 = plane_of(surface, abs(facet) - 1)
-        planes[j, 0], planes[j, 1], planes[j, 2], planes[j, 3] = n0, n1, n2, n0 * a0 + n1 * a1 + n2 * a2
-        planes[j, 4] = surface.rows[surface.object_id[facet - 1], INDEX] if facet > 0 else 0.0
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def turned_at(planes: Float, j: int, o: Vector, d: Vector) -> tuple[bool, Vector, Vector]:
-    """As `turned`, at one of the planes of a chain (`set_planes`)."""
-    normal = row_vector(planes, j)
+def past_plane(normal: Vector, distance: float, index: float, o: Vector, d: Vector) -> tuple[bool, Vector, Vector]:
+    """A ray of unit direction on from a plane, as of `facet_plane`. False: it does not come there, or is not
+    refracted."""
     c = -dot(normal, d)
-    s = (dot(normal, o) - planes[j, 3]) / c
+    s = (dot(normal, o) - distance) / c
     if not s > 0.0:
         return False, o, d
     o = along(o, s, d)
-    index = planes[j, 4]
     if index == 0.0:
         return True, o, plus(d, scaled(2.0 * c, normal))
     eta = index if c > 0.0 else 1.0 / index
@@ -117,6 +92,30 @@ def turned_at(planes: Float, j: int, o: Vector, d: Vector) -> tuple[bool, Vector
     if sine2 >= 1.0:
         return False, o, d
     return True, o, plus(scaled(1.0 / eta, d), scaled(c / eta - math.copysign(math.sqrt(1.0 - sine2), c), normal))
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def turned(surface: Surface, facet: int, o: Vector, d: Vector) -> tuple[bool, Vector, Vector]:
+    """A ray of unit direction on from the plane of a facet (`facets` of `path_vertex.PATH`), as if this had no edge.
+
+    False: it does not come to the plane, or is not refracted there.
+    """
+    return past_plane(*facet_plane(surface, facet), o, d)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def set_planes(surface: Surface, chain: Record, planes: Float) -> None:
+    """The planes of a chain, as of `facet_plane` -> planes (MOST_FACETS, 5)."""
+    for j in range(chain.count):
+        normal, distance, index = facet_plane(surface, chain.facets[j])
+        store_row(planes, j, normal)
+        planes[j, 3], planes[j, 4] = distance, index
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def turned_at(planes: Float, j: int, o: Vector, d: Vector) -> tuple[bool, Vector, Vector]:
+    """As `turned`, at one of the planes of a chain (`set_planes`)."""
+    return past_plane(row_vector(planes, j), planes[j, 3], planes[j, 4], o, d)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
