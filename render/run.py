@@ -150,6 +150,11 @@ class Run:
         """What the first frame of the block found of a part; None: this is it, or there is no block."""
         return None if self.lessons is None else self.lessons.taught(part)
 
+    @property
+    def teaches(self) -> bool:
+        """This is the first frame of a block, and others are taught what it finds."""
+        return self.lessons is not None and not self.lessons.given
+
     def teach(self, part: str, value: object) -> None:
         """Leave what was found of a part to the other frames of the block, if this is its first."""
         if self.lessons is not None:

@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.special import erf
 
@@ -309,12 +310,14 @@ def _profile(distance: Float, width: Float, integrated: bool) -> tuple[Float, Fl
     return width * unit, at_left - at_right, unit - (right * at_right - left * at_left)
 
 
+@njit(nogil=True, cache=True, error_model="numpy")
 def _scatter(image: Float32, rows: Int, first: Int, weight: Float) -> None:
     """Add weights (n, m) from pixel `first` (n,) on to rows (n,) of an image."""
-    x = first[:, None] + np.arange(weight.shape[1])
-    # a scan line is there once, so that none of its pixels is added to twice
-    n, k = np.nonzero((x >= 0) & (x < image.shape[1]) & (weight != 0.0))
-    image[rows[n], x[n, k]] += weight[n, k].astype(np.float32)
+    for n in range(weight.shape[0]):
+        for k in range(weight.shape[1]):
+            x = first[n] + k
+            if 0 <= x < image.shape[1] and weight[n, k] != 0.0:
+                image[rows[n], x] += np.float32(weight[n, k])
 
 
 def _of_nearest(u: Float, rows: Int, tried_u: Float, tried: Int, first: Int, weight: Float) -> tuple[Int, Float]:

@@ -40,8 +40,8 @@ ENOUGH = 0.05
 AROUND = 3
 """Pixels on each side of those with weight that are sampled as well, so that what a lens blurs into them is no mere
 interpolation."""
-REACH = 2
-"""Pixels on each side over which variances are averaged."""
+REACH, POOLED = 2, 1 << 14
+"""Pixels on each side over which variances are averaged, and pixels that a thread does so for at a time."""
 PILOT, GROWTH, PASSES = 2, 4.0, 12
 """Samples of each half on every pixel at first; most by which a pass multiplies those of a scan line; most passes."""
 FAR = 8.0
@@ -131,14 +131,14 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
 
     def known() -> Float:
         some = np.unique(band.line[(band.weight > 0.0) | moves.measured])
-        return np.asarray(np.maximum(_moments(film, band), moves.variance)[some])
+        return np.asarray(np.maximum(_moments(film, band, run.threads), moves.variance)[some])
 
     for level in range(PILOT):
         add(level, np.full((len(band.pixels), 2), level + 1, np.int32), run.between(0.0, 0.3))
         if level == 0 and np.mean(known() <= SURE) >= SURE_LINES:
             return np.sqrt(known())
     for level in range(PILOT, PILOT + PASSES):
-        count = _wanted(film, band, moves)
+        count = _wanted(film, band, moves, run.threads)
         more = count - film.done
         left, asked = max(most - film.total, 0), more.sum(dtype=np.int64)
         if asked > left:
@@ -150,25 +150,27 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
     return np.sqrt(known())
 
 
-def _moments(film: PixelSamples, band: Band) -> Float:
+def _moments(film: PixelSamples, band: Band, threads: int | None) -> Float:
     """Of each scan line of the image the sum of weight^2 times variance, in the colour that is known worst."""
     heavy = np.flatnonzero(band.weight)
     if not len(heavy):
         return np.zeros(max(band.place.shape))
     halves, count = film.means().astype(np.float64), 1.0 / film.done
     single = (halves[:, 0] - halves[:, 1]) ** 2 / count.sum(axis=1)[:, None]
-    variance = _pooled(single, band, heavy) * count[heavy].sum(axis=1)[:, None] / 4.0
+    variance = _pooled(single, band, heavy, threads) * count[heavy].sum(axis=1)[:, None] / 4.0
     weight, line = band.weight[heavy] ** 2, band.line[heavy]
     return np.max([np.bincount(line, weight * colour, max(band.place.shape)) for colour in variance.T], axis=0)
 
 
-def _wanted(film: PixelSamples, band: Band, moves: LineMoves) -> Int:
+def _wanted(film: PixelSamples, band: Band, moves: LineMoves, threads: int | None) -> Int:
     """(m, 2) samples of each half for the scan lines to meet the goal: as many on all pixels that a line is measured
     on, beside them as the other half's variance says."""
     done, heavy, measured = film.done, np.flatnonzero(band.weight), moves.measured
-    moments, moved = MARGIN * _moments(film, band), MARGIN * moves.variance
+    moments, moved = MARGIN * _moments(film, band, threads), MARGIN * moves.variance
     spread, lines = film.spread.astype(np.float64), len(moments)
-    deviation = np.sqrt([_pooled(spread[:, other], band, heavy).max(axis=1) for other in (1, 0)]) * band.weight[heavy]
+    deviation = (
+        np.sqrt([_pooled(spread[:, other], band, heavy, threads).max(axis=1) for other in (1, 0)]) * band.weight[heavy]
+    )
     both = deviation, done[heavy].T
     total, now = np.array([[np.bincount(band.line[heavy], half, lines) for half in one] for one in both])
     alone = _needed(now, moments, MARGIN * total**2 / 2.0)
@@ -205,10 +207,11 @@ def _step(now: Float, needed: Float, moments: Float, capped: Float) -> Float:
     return np.where(moments > 1.0, np.where(capped < 1.0, left, some), 0.0)
 
 
-def _pooled(values: Float, band: Band, some: Long) -> Float:
+def _pooled(values: Float, band: Band, some: Long, threads: int | None) -> Float:
     """Values (m, 3) of the band's pixels -> (n, 3) of some of them, each averaged with its neighbours'."""
     out = np.empty((len(some), 3))
-    pool(np.ascontiguousarray(values), band.pixels[some], band.place, out)
+    values, pixels = np.ascontiguousarray(values), band.pixels[some]
+    map_chunks(lambda a, b: pool(values, pixels[a:b], band.place, out[a:b]), len(some), POOLED, threads)
     return out
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from scipy.ndimage import binary_dilation
 
@@ -50,6 +51,8 @@ FAINT = 0.01
 """Of the RMS of lit pixels: what is too little to be looked at more closely. Chosen, not tuned."""
 LEAST_SIGMA = 0.2
 """px, of the sheet in the image: light paths find a thinner one sooner than rays through pixels. Chosen, not tuned."""
+SOME = 4096
+"""Rays of a list, at most, that tell how far away lit surfaces are."""
 FINER = (4, 8)
 """Cells a side where a pixel is not smooth, with a ray anywhere in each."""
 
@@ -125,7 +128,7 @@ def clear_light(task: BdptPass, run: Run) -> ClearLight:
 
 def sheet_pixels(task: BdptPass) -> float:
     """About the sigma of the sheet in the image where it comes over chains, px."""
-    places = np.concatenate([chains.seen["o"] for chains in task.lit_chains])
+    places = np.concatenate([chains.seen["o"][:: -(-len(chains.seen) // SOME)] for chains in task.lit_chains])
     from_laser, from_camera = (
         float(np.median(np.linalg.norm(places - pose[:3, 3], axis=1)))
         for pose in (task.T_world_laser, task.view.T_world_camera)
@@ -173,13 +176,20 @@ def integrated(integral: Integral) -> ClearLight:
     return ClearLight(pixels[known], np.maximum(radiance[known], 0.0), error[known], sum(integral.invalid))
 
 
-def _near(pixels: Long, shape: tuple[int, int]) -> Bool:
-    """(h, w) of pixels (n,) and all within SPACING rows and columns of them."""
-    near, (row, column) = np.zeros(shape, np.bool_), np.divmod(pixels, shape[1])
-    for down in range(-SPACING, SPACING + 1):
-        for right in range(-SPACING, SPACING + 1):
-            near[np.clip(row + down, 0, shape[0] - 1), np.clip(column + right, 0, shape[1] - 1)] = True
-    return near
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def unknown_near(pixels: Long, known: Bool, out: Long) -> int:
+    """Those within SPACING rows and columns of pixels (n,) that are not known (h, w) -> out; how many. They are now."""
+    height, width = known.shape
+    count = 0
+    for pixel in pixels:
+        row, column = pixel // width, pixel % width
+        for i in range(max(row - SPACING, 0), min(row + SPACING + 1, height)):
+            for j in range(max(column - SPACING, 0), min(column + SPACING + 1, width)):
+                if not known[i, j]:
+                    known[i, j] = True
+                    out[count] = i * width + j
+                    count += 1
+    return count
 
 
 def _about(some: Bool, beside: Long) -> Bool:
@@ -218,7 +228,9 @@ class Integral:
             known.ravel()[pixels] = True
             radiance[pixels] = self.sampled(pixels, 1)
             # what was too thin for the look goes on where it was met
-            pixels = np.flatnonzero(_near(pixels[radiance[pixels].any(axis=1)], shape) & ~known)
+            met = pixels[radiance[pixels].any(axis=1)]
+            room = np.empty(min(len(met) * (2 * SPACING + 1) ** 2, known.size), np.int64)
+            pixels = np.sort(room[: unknown_near(met, known, room)])
         pixels = np.flatnonzero(known)
         return pixels, radiance[pixels]
 

@@ -209,10 +209,19 @@ def find_specular_pixels(world: World, surface: Surface, camera: Camera, T_world
 
 def reserve_for_specular(camera_paths: Float, specular: Bool, count: float) -> None:
     """Leave a share of (pixels,) camera paths, `count` in all, to specular pixels alike."""
-    behind = int(specular.sum())
+    behind = np.count_nonzero(specular)
     if behind:
-        camera_paths *= 1.0 - SPECULAR_RESERVE
-        camera_paths[specular] += SPECULAR_RESERVE * count / behind
+        more = SPECULAR_RESERVE * count / behind
+        map_chunks(partial(add_reserve, camera_paths, specular, more), len(camera_paths), PIXELS_A_CHUNK)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def add_reserve(camera_paths: Float, specular: Bool, more: float, start: int, stop: int) -> None:
+    """Take the reserve from (pixels,) camera paths start .. stop, and add to those of specular pixels."""
+    for i in range(start, stop):
+        # what is zero is only read: its memory may not have been given by the system yet
+        if camera_paths[i] != 0.0 or specular[i]:
+            camera_paths[i] = (1.0 - SPECULAR_RESERVE) * camera_paths[i] + (more if specular[i] else 0.0)
 
 
 def no_guide(camera: Camera) -> Guide:

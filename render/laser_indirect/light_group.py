@@ -93,7 +93,7 @@ class IndirectLight(LightGroup[IndirectPlan]):
                 allowed = None if aim is None else aim.importance.allowed
                 quality[i:] = [quality_of(laser.laser.name, image, settings, allowed, frame.laser_direct[i])]
                 yield Estimate(tuple(images), tuple(quality))
-        if frame.importance is not None:
+        if frame.importance is not None and run.teaches:
             run.teach(self.field, tuple(smoothed(image, LOOK_SIGMA) for image in images))
 
 

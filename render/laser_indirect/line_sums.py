@@ -14,6 +14,8 @@ from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 
 BLOCKS_A_CHUNK = 1 << 12
 """Blocks that a thread does at a time."""
+SMOOTHED_ROWS = 128
+"""Rows of an image that a thread smooths at a time, at least."""
 
 
 def block_sums(values: Float, blocks: int) -> Float:
@@ -40,8 +42,15 @@ def smoothed(image: Float32, sigma: float) -> Float32:
     import cv2
 
     reach = int(4 * sigma + 0.5)
-    weights = cv2.getGaussianKernel(2 * reach + 1, sigma, cv2.CV_32F)
-    return cv2.sepFilter2D(image, -1, weights, weights, borderType=cv2.BORDER_REFLECT)
+    weights, out = cv2.getGaussianKernel(2 * reach + 1, sigma, cv2.CV_32F), np.empty_like(image)
+
+    def work(start: int, stop: int) -> None:
+        first, last = max(start - reach, 0), min(stop + reach, len(image))
+        band = cv2.sepFilter2D(image[first:last], -1, weights, weights, borderType=cv2.BORDER_REFLECT)
+        out[start:stop] = band[start - first : stop - first]
+
+    map_chunks(work, len(image), max(SMOOTHED_ROWS, 4 * reach))
+    return out
 
 
 def mean_image(buffers: list[PassBuffer]) -> Float32:

@@ -131,8 +131,7 @@ def _pilot_passes(
     map_chunks(work, len(buffers), 1, thread_count(run.threads), run.cancelled)
     sums = [buffer.sums.copy() for buffer in buffers]
     effect = None if projection is None else Effect.of(projection, buffers)
-    for buffer in buffers:
-        clear_pass(buffer)
+    map_chunks(lambda start, stop: clear_pass(buffers[start]), len(buffers), 1, run.threads)
     return sums, effect
 
 

@@ -12,6 +12,7 @@ what the grid has missed is found by light paths.
 from __future__ import annotations
 
 import math
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numba
@@ -20,6 +21,7 @@ from scipy.ndimage import binary_dilation
 
 from render.base.arrays import Bool, Float, Int, Long
 from render.base.borrowed import borrowed
+from render.base.threads import map_chunks
 from render.base.vectors import Vector, dot, store, vector
 from render.camera.camera import Camera
 from render.laser.irradiance import SHEET_SIGMAS
@@ -60,6 +62,10 @@ LEAST_SHARE = 1e-4
 """Of a ray's light, below which it is not followed; what it would have shown is merged. Chosen, not tuned."""
 BITS = 21
 """Of a cell's number, for each axis."""
+CELL_STEPS = np.array([1 << 2 * BITS, 1 << BITS, 1])
+"""By which a cell's number grows along each axis."""
+RAYS_A_CHUNK = 1 << 13
+"""Rays that a thread follows at a time."""
 
 
 class ChainIndex(NamedTuple):
@@ -83,7 +89,10 @@ def seen_chains(
     """The chains over which the camera sees rough surfaces; None: none is of plane mirrors and faces alone."""
     made_of = T_world_camera.tobytes(), camera, surface.rows.tobytes()
     return run.remembered(
-        "chains before the camera", world, made_of, lambda: _seen_chains(world, surface, camera, T_world_camera)
+        "chains before the camera",
+        world,
+        made_of,
+        lambda: _seen_chains(world, surface, camera, T_world_camera, run.threads),
     )
 
 
@@ -94,21 +103,28 @@ def lit_chains(
     none, or its sheet has a waist, so that its light does not come from one point."""
     made_of = T_world_laser.tobytes(), laser
     return run.remembered(
-        f"chains before {laser.name}", world, made_of, lambda: _lit_chains(world, surface, laser, T_world_laser)
+        f"chains before {laser.name}",
+        world,
+        made_of,
+        lambda: _lit_chains(world, surface, laser, T_world_laser, run.threads),
     )
 
 
-def _seen_chains(world: World, surface: Surface, camera: Camera, T_world_camera: Float) -> ChainIndex | None:
+def _seen_chains(
+    world: World, surface: Surface, camera: Camera, T_world_camera: Float, threads: int | None
+) -> ChainIndex | None:
     """As `seen_chains`, found now."""
     spacing = max(1.0, math.sqrt(camera.width * camera.height / GRID_RAYS))
     v, u = np.mgrid[0 : camera.height - 1 : spacing, 0 : camera.width - 1 : spacing]
     directions, known = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1))
     slopes = directions[known, :2] / directions[known, 2:]
-    seen = _landed_rays(world, surface, slopes, T_world_camera)
+    seen = _landed_rays(world, surface, slopes, T_world_camera, threads)
     return _listed(seen, world, surface, T_world_camera, spacing / max(camera.fx, camera.fy)) if len(seen) else None
 
 
-def _lit_chains(world: World, surface: Surface, laser: LineLaser, T_world_laser: Float) -> tuple[ChainIndex, ...]:
+def _lit_chains(
+    world: World, surface: Surface, laser: LineLaser, T_world_laser: Float, threads: int | None
+) -> tuple[ChainIndex, ...]:
     """As `lit_chains`, found now."""
     beam = laser.packed()
     if beam[1] != 0.0:
@@ -117,7 +133,7 @@ def _lit_chains(world: World, surface: Surface, laser: LineLaser, T_world_laser:
     spacing = math.sqrt(4.0 * across * along / GRID_RAYS)
     x, y = (np.linspace(-end, end, max(3, math.ceil(2.0 * end / spacing))) for end in (across, along))
     slopes, apart = np.stack(np.meshgrid(x, y), axis=-1), np.array([x[1] - x[0], y[1] - y[0]])
-    seen = _landed_rays(world, surface, slopes.reshape(-1, 2), T_world_laser)
+    seen = _landed_rays(world, surface, slopes.reshape(-1, 2), T_world_laser, threads)
     (key,) = chain_keys(seen["facets"])
     narrow = np.bincount(key)[key] < NARROW
     about = np.zeros(slopes.shape[:2], np.bool_)
@@ -128,7 +144,8 @@ def _lit_chains(world: World, surface: Surface, laser: LineLaser, T_world_laser:
     if about.any() and finer > 1:
         part = (np.arange(finer) + 0.5) / finer - 0.5
         parts = np.stack(np.meshgrid(part, part), axis=-1).reshape(-1, 2) * apart
-        again = _landed_rays(world, surface, (slopes[about][:, None] + parts).reshape(-1, 2), T_world_laser)
+        finer_slopes = (slopes[about][:, None] + parts).reshape(-1, 2)
+        again = _landed_rays(world, surface, finer_slopes, T_world_laser, threads)
         found, wide = chain_keys(again["facets"], seen["facets"][~narrow])
         known = np.isin(found, wide)
         # a chain is in one list alone, or its light would be found twice
@@ -139,19 +156,31 @@ def _lit_chains(world: World, surface: Surface, laser: LineLaser, T_world_laser:
     return tuple(_listed(some, world, surface, T_world_laser, size) for some, size in lists if len(some))
 
 
-def _landed_rays(world: World, surface: Surface, slopes: Float, T_world_origin: Float) -> Records:
+def _landed_rays(world: World, surface: Surface, slopes: Float, T_world_origin: Float, threads: int | None) -> Records:
     """(k,) SEEN: where rays of slopes (n, 2) from the origin of a frame come to over chains."""
-    rays = world.rays
     plain = (surface.detail == 0) & (surface.second < 0)
     walkable = plain & np.array([is_specular_row(row) for row in surface.rows])
     if not np.any(walkable[: surface.object_id.max() + 1]):
         return np.empty(0, SEEN)
-    ahead = np.zeros(len(slopes), SEEN)
-    directions = np.concatenate([slopes, np.ones((len(slopes), 1))], axis=1)
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    ahead["slopes"], ahead["d"] = slopes, directions @ T_world_origin[:3, :3].T
-    ahead["o"], ahead["share"], ahead["ray"] = T_world_origin[:3, 3], 1.0, np.arange(len(slopes))
-    found: list[Records] = []
+    found: list[list[Records]] = [[] for _ in range(-(-len(slopes) // RAYS_A_CHUNK))]
+
+    def work(start: int, stop: int) -> None:
+        ahead = np.zeros(stop - start, SEEN)
+        directions = np.concatenate([slopes[start:stop], np.ones((stop - start, 1))], axis=1)
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        ahead["slopes"], ahead["d"] = slopes[start:stop], directions @ T_world_origin[:3, :3].T
+        ahead["o"], ahead["share"], ahead["ray"] = T_world_origin[:3, 3], 1.0, np.arange(start, stop)
+        found[start // RAYS_A_CHUNK] = _landed(world, surface, walkable, ahead)
+
+    map_chunks(work, len(slopes), RAYS_A_CHUNK, threads)
+    # by how many facets they met: which of a chain's rays stands for it depends on no chunk
+    met = [some for several in zip_longest(*found) for some in several if some is not None]
+    return np.concatenate(met) if met else np.empty(0, SEEN)
+
+
+def _landed(world: World, surface: Surface, walkable: Bool, ahead: Records) -> list[Records]:
+    """SEEN rays (n,) -> those that came to a rough surface, over ever more facets."""
+    rays, found = world.rays, list[Records]()
     for _ in range(MOST_FACETS + 1):
         triangle, _ = rays.intersect((ahead["o"] - rays.centre).astype(np.float32), ahead["d"].astype(np.float32))
         after, landed = np.empty(2 * len(ahead), SEEN), np.empty(len(ahead), SEEN)
@@ -160,7 +189,7 @@ def _landed_rays(world: World, surface: Surface, slopes: Float, T_world_origin: 
         found.append(landed[:k])
         if not n:
             break
-    return np.concatenate(found)
+    return found
 
 
 def _listed(seen: Records, world: World, surface: Surface, T_world_origin: Float, spacing: float) -> ChainIndex:
@@ -178,17 +207,24 @@ def _listed(seen: Records, world: World, surface: Surface, T_world_origin: Float
 def listed_by_cell(seen: Records, centre: Float, size: float) -> ChainIndex:
     """SEEN records (n,) by the cells within half a cell of where they have come to, one of each chain and cell."""
     (key,), low = chain_keys(seen["facets"]), np.floor((seen["o"] - centre) / size - 0.5).astype(np.int64)
-    corners = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)])
-    place = low[:, None] + corners + (1 << (BITS - 1))
-    cells = ((place[..., 0] << 2 * BITS) | (place[..., 1] << BITS) | place[..., 2]).ravel()
-    whose, key = np.repeat(np.arange(len(seen)), 8), np.repeat(key, 8)
+    low = (low + (1 << (BITS - 1))) @ CELL_STEPS
+    # those of a chain that have the same eight cells are one, before there are eight of each
+    some = np.sort(_first_of_each(low, key))
+    corners = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)]) @ CELL_STEPS
+    cells = (low[some][:, None] + corners).ravel()
+    first = _first_of_each(cells, np.repeat(key[some], 8))
+    cells, starts = np.unique(cells[first], return_index=True)
+    starts = np.append(starts, len(first))
+    return ChainIndex(cells, starts, seen.take(some[first // 8]), centre, size, int(np.diff(starts).max()))
+
+
+def _first_of_each(cells: Long, key: Long) -> Long:
+    """(k,) where each cell (n,) and key (n,) are first, in the order of cells and keys."""
     order = np.lexsort((key, cells))
-    cells, key, whose = cells[order], key[order], whose[order]
+    cells, key = cells[order], key[order]
     first = np.ones(len(cells), np.bool_)
     first[1:] = (cells[1:] != cells[:-1]) | (key[1:] != key[:-1])
-    cells, starts = np.unique(cells[first], return_index=True)
-    starts = np.append(starts, first.sum())
-    return ChainIndex(cells, starts, seen.take(whose[first]), centre, size, int(np.diff(starts).max()))
+    return np.asarray(order[first])
 
 
 def chain_keys(*facets: Int) -> list[Long]:

@@ -21,7 +21,9 @@ CLOSED = 0.9
 def objects_around(world: World, items: Iterable[int], point: Float) -> list[int]:
     """Those of the objects `items` whose closed surface encloses the point (3,), world, m."""
     # only objects whose box holds the point can enclose it
-    boxed = [item for item in items if _in_box(world, item, point)]
+    low, high = world.boxes
+    inside = np.all((low <= point) & (point <= high), axis=1)
+    boxed = [item for item in items if item < len(inside) and inside[item]]
     around = []
     for item in boxed:
         if abs(winding_number(world.vertices, world.triangles[world.object_id == item], point)) > CLOSED:
@@ -36,12 +38,3 @@ def winding_number(vertices: Float, triangles: Int, point: Float) -> float:
     triple = np.einsum("ij,ij->i", a, np.cross(b, c))
     dots = np.einsum("ij,ij->i", a, b) * lc + np.einsum("ij,ij->i", b, c) * la + np.einsum("ij,ij->i", c, a) * lb
     return float(np.sum(2.0 * np.arctan2(triple, la * lb * lc + dots))) / (4.0 * math.pi)
-
-
-def _in_box(world: World, item: int, point: Float) -> bool:
-    used = world.triangles[world.object_id == item]
-    if len(used) == 0:
-        return False
-    # an object's vertices are contiguous
-    points = world.vertices[used.min() : used.max() + 1]
-    return bool(np.all(points.min(axis=0) <= point) and np.all(points.max(axis=0) >= point))

@@ -98,8 +98,11 @@ def sheet_meets(world: World, laser: LineLaser, T_world_laser: Float) -> bool:
     _, waist, focus, rayleigh, edge = laser.packed()[:5]
     reach = SHEET_SIGMAS * (rayleigh * z if waist == 0.0 else waist * np.sqrt(1.0 + ((z - focus) / rayleigh) ** 2))
     # each of these regions is convex: a triangle with all corners in one lies in it
-    outside = np.stack([z <= 0.0, x > reach, x < -reach, y > edge * z, y < -edge * z])
-    return bool(np.any(~np.any(np.all(outside[:, world.triangles], axis=2), axis=0)))
+    outside = np.zeros(len(z), np.uint8)
+    for bit, beyond in enumerate((z <= 0.0, x > reach, x < -reach, y > edge * z, y < -edge * z)):
+        outside |= np.left_shift(beyond.view(np.uint8), np.uint8(bit))
+    a, b, c = outside[world.triangles].T
+    return bool(np.any(a & b & c == 0))
 
 
 @dataclass(frozen=True)

@@ -78,6 +78,20 @@ class World:
         return other
 
     @cached_property
+    def boxes(self) -> tuple[Float, Float]:
+        """Least and largest coordinates (o, 3) of each object up to the last that has triangles, found at first use;
+        infinite, the least above the largest, where it has none."""
+        count = int(self.object_id.max(initial=-1)) + 1
+        low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+        for item in range(count):
+            used = self.triangles[self.object_id == item]
+            if len(used):
+                # an object's vertices are contiguous
+                points = self.vertices[used.min() : used.max() + 1]
+                low[item], high[item] = points.min(axis=0), points.max(axis=0)
+        return low, high
+
+    @cached_property
     def nesting(self) -> Nesting:
         """Which transparent bodies overlap, found at first use."""
         return nesting_of(self)

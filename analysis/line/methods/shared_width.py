@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from functools import cache
 
+import numba
 import numpy as np
 
 from analysis.line.detection.detect import PRIOR_WIDTHS
@@ -118,7 +119,18 @@ def _moments(log: Float, widths: Float) -> tuple[Float, Float]:
 
 def _weighed(values: Float, weights: Float) -> Float:
     """(n, m), (k, m) -> (n, k): sums over m, to the bit the same wherever in an image a scan line is."""
-    return np.stack([(values * row).sum(axis=1) for row in weights], axis=1)
+    out = np.zeros((len(values), len(weights)))
+    add_weighed(values, np.ascontiguousarray(weights.T), out)
+    return out
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def add_weighed(values: Float, weights: Float, out: Float) -> None:
+    """Add the products (n, m) times (m, k), term by term in one order, to out (n, k)."""
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            for k in range(weights.shape[1]):
+                out[i, k] += values[i, j] * weights[j, k]
 
 
 def _new_places(u: Float, sigma_u: Float) -> Float:

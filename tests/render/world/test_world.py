@@ -11,6 +11,7 @@ from PIL import Image
 import render.mesh.load
 import render.world.material_atlas
 from render.base.errors import InputError
+from render.base.pose import Pose
 from render.camera.camera import Camera
 from render.material.material import Blend, BumpMap, Lambertian, Texture
 from render.scene.motion import LinearStage, Turntable
@@ -60,6 +61,16 @@ def test_images_are_counted_once_however_many_objects_share_them(
     masked = Blend(base=bumps, over=Lambertian(), mask=Texture(path="c.png", srgb=False))
     with pytest.raises(InputError, match=r"object 'p': material\.mask: the scene has too many pixels of textures"):
         build_world(scene_of(SceneObject(name="p", shape=Plane(), material=masked)), tmp_path)
+
+
+def test_the_boxes_of_objects_are_those_of_their_own_vertices(tmp_path: Path) -> None:
+    shift = Pose(translation=(1.0, 0.0, 0.0))
+    ball = SceneObject(name="ball", shape=Sphere(segments=16, radius=0.1), T_world_object=shift)
+    low, high = build_world(
+        scene_of(SceneObject(name="plane", shape=Plane(width=0.4, height=0.2)), ball), tmp_path
+    ).boxes
+    assert low == pytest.approx(np.array([(-0.2, -0.1, 0.0), (0.9, -0.1, -0.1)]), abs=2e-3)
+    assert high == pytest.approx(np.array([(0.2, 0.1, 0.0), (1.1, 0.1, 0.1)]), abs=2e-3)
 
 
 @pytest.mark.parametrize("motion", ["shift", "turn"])
