@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar, cast
@@ -46,7 +47,7 @@ class Memory:
     def __init__(self, *, one_frame: bool = False) -> None:
         """one_frame: nothing is kept that only frames after it would find again."""
         self._kept: dict[str, tuple[object, Any, Any]] = {}
-        self._one_frame = one_frame
+        self.one_frame = one_frame
 
     def recall(self, part: str, world: object, made_of: Any) -> Any:
         """The value of a part that was made in the very same world, of the equal; None: there is none."""
@@ -55,12 +56,16 @@ class Memory:
 
     def keep(self, part: str, world: object, made_of: Any, value: object, *, for_others: bool = False) -> None:
         """Of a part as of now, in place of the one before; for_others: the frame itself asks for it but once."""
-        if not (for_others and self._one_frame):
+        if not (for_others and self.one_frame):
             self._kept[part] = world, made_of, value
 
 
 def never() -> bool:
     return False
+
+
+def unseen(frame: Frame) -> None:
+    """Of a frame that nobody looks at before it is done."""
 
 
 def ignore(done: float) -> None:
@@ -93,6 +98,8 @@ class Run:
     """Of the frame under way, which `render.progressive` begins from `seconds`."""
     later: int = 0
     """Parts of the frame that come after this one, which have their share of its time as well."""
+    watched: bool = True
+    """Somebody looks at images before the last of each light: others are made only where a time limit may end it."""
     goal: Callable[[Frame], Importance] | None = None
     """Where errors matter, of a frame as far as it is known; None: everywhere alike."""
     part: str = ""
@@ -149,6 +156,16 @@ class Run:
     def taught(self, part: str) -> Any:
         """What the first frame of the block found of a part; None: this is it, or there is no block."""
         return None if self.lessons is None else self.lessons.taught(part)
+
+    @property
+    def alone(self) -> bool:
+        """What this frame finds is no other frame's."""
+        return self.lessons is None and (self.memory is None or self.memory.one_frame)
+
+    @property
+    def shows_early(self) -> bool:
+        """An image is wanted before the last: to be looked at, or in place of that when the time is over."""
+        return self.watched or math.isfinite(self.deadline.end)
 
     @property
     def teaches(self) -> bool:

@@ -39,7 +39,8 @@ def measured_images(
     target: float | None = None,
     run: Run = Run(),
 ) -> Iterator[AmbientImage]:
-    """The coarse image, then the one whose scan lines are known, or on which `most` samples a pixel are spent.
+    """The coarse image, where one is wanted early, then the one whose scan lines are known, or on which `most` samples
+    a pixel are spent.
 
     Where the goal is out of reach, all that is allowed goes to where the lines are; where `most` leaves no room for a
     first look at them, the image is rendered in its place, to the relative error `target`. As `ambient_images`; the
@@ -58,10 +59,13 @@ def measured_images(
     coarse = _coarse(placed, paths, (most, surfaces, clamp, run.seed), budget, run.between(0.0, 0.5))
     band = band_of(importance, coarse, run.threads)
     film = PixelSamples(band.pixels)
-    yield _image(coarse, film, None)
+    if run.shows_early:
+        yield _image(coarse, film, None)
     deviations = np.zeros(0)
     if len(band.pixels):
         deviations = sample_band(film, paths, band, budget - coarse.samples, run.between(0.5, 1.0))
+    if run.shows_early or not run.alone:
+        coarse = replace(coarse, radiance=_copied(coarse.radiance))
     yield _image(coarse, film, deviations, band.pixels)
 
 
@@ -118,7 +122,7 @@ def _coarse(placed: PlacedScene, paths: CameraPaths, settings: tuple[Any, ...], 
 
 
 def _copied(radiance: Float32) -> Float32:
-    """(h, w, 3) of the first image, which whoever shows it still holds."""
+    """(h, w, 3) of the first image, which whoever shows it or another frame still holds."""
     copy = np.empty_like(radiance)
 
     def work(start: int, stop: int) -> None:
@@ -135,12 +139,12 @@ def seen_from(placed: PlacedScene, *settings: object) -> tuple[object, ...]:
 
 
 def _image(coarse: CoarseImage, film: PixelSamples, deviations: Float | None, band: Int | None = None) -> AmbientImage:
-    """The coarse image, with the pixels of the band in it once they are sampled to some deviations of the lines."""
+    """The coarse image, with the pixels of the band in it, in place, once they are sampled to some deviations of the
+    lines."""
     radiance, error, total = coarse.radiance, float("nan"), coarse.samples + film.total
     lines: int | None = None
     unknown: int | None = None
     if deviations is not None and band is not None:
-        radiance = _copied(radiance)
         radiance.reshape(-1, 3)[band] = film.means().mean(axis=1)
         error, lines, unknown = known_below(deviations), len(deviations), int(np.sum(deviations > 1.0))
     return AmbientImage(

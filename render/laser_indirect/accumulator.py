@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.base.arrays import Float, Float32
+from render.base.arrays import Float, Float32, Int
 from render.base.nonzero import nonzero_places
 from render.base.threads import map_chunks
 from render.importance import Importance
@@ -74,7 +74,7 @@ class Accumulator:
     """Share of the light that techniques which start at the camera can make as well."""
     specular: NDArray[np.bool_]
     """(pixels,) where the camera sees a mirror or clear glass; (0,): there is none."""
-    camera_paths: Float
+    camera_paths: Float32
     """(pixels,) expected camera paths of each pixel in a pass of the next wave."""
     guide: Guide
     guide_moments: Float
@@ -233,11 +233,12 @@ class Accumulator:
         map_chunks(work, len(mean), PIXELS_A_CHUNK)
         return mean.reshape(shape)
 
-    def lone(self, shape: tuple[int, int]) -> Float32 | None:
-        """(h, w) of `radiance`, what is a peak beside the line by one pass alone; None: no line is the goal."""
+    def lone(self) -> tuple[Int, Float32] | None:
+        """(n,) pixels, and what of `radiance` is a peak beside the line there by one pass alone; None: no line is the
+        goal."""
         if self.line is None or not len(self.largest):
             return None
-        return lone_light(self.total, self.largest, self.weight, self.line.projection).reshape(shape)
+        return lone_light(self.total, self.largest, self.weight, self.line.projection)
 
     def arrays(self) -> Arrays:
         """What a checkpoint keeps."""
@@ -260,6 +261,7 @@ class Accumulator:
         """The accumulator that gave `arrays`, of copies of them. KeyError, ValueError: they are of something else."""
         numbers: dict[str, Any] = {name: arrays[name].item() for name in NUMBERS}
         images: dict[str, Any] = {name: arrays[name].copy() for name in IMAGES}
+        images["camera_paths"] = images["camera_paths"].astype(np.float32, copy=False)
         low, high, *cumulative = arrays["fan"]
         fan = FanDistribution(float(low), float(high), np.array(cumulative))
         guide = Guide(int(arrays["guide_width"].item()), arrays["guide_row"], arrays["guide"])

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from render.base.arrays import Bool, Float, Int, Long
+from render.base.arrays import Bool, Float, Float32, Int, Long
 from render.base.errors import Cancelled
 from render.base.pose import invert
 from render.base.threads import Cancel
@@ -30,7 +30,7 @@ from render.laser_indirect.connections import (
     init_light_mis,
     mark_reachable,
 )
-from render.laser_indirect.guiding import DrawnPaths, Guide, any_specular, draw_camera_paths
+from render.laser_indirect.guiding import NO_KEYS, AlikePixels, DrawnPaths, Guide, any_specular, draw_camera_paths
 from render.laser_indirect.path_vertex import (
     ALL_KINDS,
     CAUSTIC,
@@ -67,7 +67,6 @@ CANDIDATES, LATER_CANDIDATES = 8, 2
 """Light vertices of the first surface weighed against each other, at the camera's first surface and those after it."""
 CAMERA_SEED = 0x5DEECE66D
 """Parts the random numbers of camera paths from those of light paths."""
-NO_KEYS: Int = np.zeros(0, np.int32)
 NOWHERE: Bool = np.zeros(0, np.bool_)
 KINDS = 5
 """Sums of a pass: of each combination of the bits CAUSTIC and SUBSURFACE_LIGHT, and of SPECULAR_CHAIN by itself."""
@@ -79,14 +78,12 @@ class Sampling:
 
     light_paths: int
     fan: FanDistribution
-    camera_paths: Float
+    camera_paths: Float32
     """(pixels,) expected."""
     active: Int
     """The pixels that may have a camera path, in order."""
     guide: Guide
-    keys: Int = field(default_factory=lambda: NO_KEYS)
-    """Of the active pixels, the numbers that their camera paths' random numbers follow from; (0,): each path has its
-    own."""
+    alike: AlikePixels = NO_KEYS
 
 
 @dataclass(frozen=True)
@@ -162,7 +159,7 @@ class BdptPass:
         there, roughly, for the camera paths of later passes. None: it is not.
         """
         seed = wrapped(self.seed * 1_000_003 + number)
-        drawn = draw_camera_paths(sampling.camera_paths, sampling.active, sampling.keys, seed ^ CAMERA_SEED)
+        drawn = draw_camera_paths(sampling.camera_paths, sampling.active, sampling.alike, seed ^ CAMERA_SEED)
         keep = len(drawn.pixels) > 0 or specular_pixels is not None
         found: list[Vertices] = []
         for first in range(0, sampling.light_paths, CHUNK_PATHS):

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from render.base.arrays import Bool, Float
+from render.base.arrays import Bool, Float, Float32
 from render.base.borrowed import borrowed
 from render.base.vectors import Vector, divided, length, minus, rotated, transformed, vector
 from render.camera.distortion import tilt_matrix
@@ -50,7 +50,7 @@ class CameraSampling(NamedTuple):
 
     camera: View
     height: int
-    camera_paths: Float
+    camera_paths: Float32
     """(pixels,) expected camera paths of a pass."""
     light_paths: int
     clear: Bool

@@ -65,6 +65,21 @@ class Guide(NamedTuple):
     """(n, BINS + 1) distribution over equal parts of the list of light vertices, from 0 to 1."""
 
 
+class AlikePixels(NamedTuple):
+    """Pixels whose random numbers follow from those of the scan line that is measured on them, all others' from their
+    own."""
+
+    pixel: Int
+    """(m,) in order."""
+    line: Int
+    """(m,) the scan line of each."""
+    lines: int
+    """Scan lines, which keys of other pixels come after; 0: nothing is keyed, each path has numbers of its own."""
+
+
+NO_KEYS = AlikePixels(np.zeros(0, np.int32), np.zeros(0, np.int32), 0)
+
+
 class DrawnPaths(NamedTuple):
     """The camera paths of a pass."""
 
@@ -80,11 +95,11 @@ def allocate_camera_paths(
     image: Float32,
     width: int,
     count: float | None,
-    camera_paths: Float | None = None,
+    camera_paths: Float32 | None = None,
     drawn: float = 0.0,
     threads: int | None = None,
     cancelled: Cancel | None = None,
-) -> Float:
+) -> Float32:
     """(pixels,) radiance so far -> expected camera paths of each pixel, about `count` in all; into `camera_paths`.
 
     In proportion to a pixel's radiance as its own paths so far know it, `drawn` times `camera_paths`, and before there
@@ -92,7 +107,7 @@ def allocate_camera_paths(
     variance within the pixel, and is given less. Raises Cancelled.
     """
     if camera_paths is None:
-        camera_paths = np.zeros(len(image))
+        camera_paths = np.zeros(len(image), np.float32)
     cells = np.zeros((-(-(len(image) // width) // COARSE), -(-width // COARSE)), np.float32)
     sums = np.zeros(len(cells))
     map_chunks(partial(sum_cells, image, width, cells, sums), len(cells), CELL_ROWS, threads, cancelled)
@@ -110,7 +125,7 @@ def allocate_camera_paths(
     return camera_paths
 
 
-def active_pixels(camera_paths: Float) -> Int:
+def active_pixels(camera_paths: Float32) -> Int:
     """(n,) the pixels that may have camera paths, in order."""
     return nonzero_places(camera_paths)
 
@@ -133,7 +148,7 @@ def predict_radiance(
     about: Float32,
     drawn: float,
     least: float,
-    camera_paths: Float,
+    camera_paths: Float32,
     start: int,
     stop: int,
 ) -> None:
@@ -153,7 +168,7 @@ def predict_radiance(
             camera_paths[pixel] = (known * image[pixel] + PRIOR_PATHS * near) / (known + PRIOR_PATHS)
 
 
-def scale(camera_paths: Float, active: Int, count: float, threads: int | None = None) -> None:
+def scale(camera_paths: Float32, active: Int, count: float, threads: int | None = None) -> None:
     """Scale camera paths (pixels,) to `count` in all, whereby what exceeds 1 grows more slowly."""
     sums = np.zeros(-(-len(active) // PIXELS_A_CHUNK))
 
@@ -168,7 +183,7 @@ def scale(camera_paths: Float, active: Int, count: float, threads: int | None = 
 
 
 @numba.njit(nogil=True, cache=True)
-def sum_scaled(camera_paths: Float, active: Int, factor: float, sums: Float, start: int, stop: int) -> None:
+def sum_scaled(camera_paths: Float32, active: Int, factor: float, sums: Float, start: int, stop: int) -> None:
     """The sum over active[start .. stop], scaled, or as it is where the factor is 0, into the chunk's place."""
     total = 0.0
     for i in range(start, stop):
@@ -178,7 +193,7 @@ def sum_scaled(camera_paths: Float, active: Int, factor: float, sums: Float, sta
 
 
 @numba.njit(nogil=True, cache=True)
-def set_scaled(camera_paths: Float, active: Int, factor: float, start: int, stop: int) -> None:
+def set_scaled(camera_paths: Float32, active: Int, factor: float, start: int, stop: int) -> None:
     """Scale the pixels active[start .. stop]."""
     for i in range(start, stop):
         value = factor * camera_paths[active[i]]
@@ -207,7 +222,7 @@ def find_specular_pixels(world: World, surface: Surface, camera: Camera, T_world
     ].ravel()
 
 
-def reserve_for_specular(camera_paths: Float, specular: Bool, count: float) -> None:
+def reserve_for_specular(camera_paths: Float32, specular: Bool, count: float) -> None:
     """Leave a share of (pixels,) camera paths, `count` in all, to specular pixels alike."""
     behind = np.count_nonzero(specular)
     if behind:
@@ -216,7 +231,7 @@ def reserve_for_specular(camera_paths: Float, specular: Bool, count: float) -> N
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def add_reserve(camera_paths: Float, specular: Bool, more: float, start: int, stop: int) -> None:
+def add_reserve(camera_paths: Float32, specular: Bool, more: float, start: int, stop: int) -> None:
     """Take the reserve from (pixels,) camera paths start .. stop, and add to those of specular pixels."""
     for i in range(start, stop):
         # what is zero is only read: its memory may not have been given by the system yet
@@ -230,7 +245,7 @@ def no_guide(camera: Camera) -> Guide:
     return Guide(camera.width, tiles, np.zeros((0, BINS + 1)))
 
 
-def first_guide(camera_paths: Float, camera: Camera) -> Guide:
+def first_guide(camera_paths: Float32, camera: Camera) -> Guide:
     """A guide, uniform so far, with a row for every tile with enough camera paths to learn from."""
     tiles = no_guide(camera).row
     count = number_tiles(camera_paths, camera.width, tiles)
@@ -239,7 +254,7 @@ def first_guide(camera_paths: Float, camera: Camera) -> Guide:
 
 
 @numba.njit(nogil=True, cache=True)
-def number_tiles(camera_paths: Float, width: int, tiles: Int) -> int:
+def number_tiles(camera_paths: Float32, width: int, tiles: Int) -> int:
     """Number the tiles with enough camera paths to learn from; returns how many they are."""
     down, across = tiles.shape
     height, count = camera_paths.shape[0] // width, 0
@@ -296,23 +311,26 @@ def update_guide_rows(wave_moments: Float, guide_moments: Float, cumulative: Flo
 
 
 @numba.njit(nogil=True, cache=True)
-def draw_camera_paths(camera_paths: Float, active: Int, keys: Int, seed: int) -> DrawnPaths:
-    """The camera paths of a pass, where some pixels, each with a key or none, may have any.
+def draw_camera_paths(camera_paths: Float32, active: Int, alike: AlikePixels, seed: int) -> DrawnPaths:
+    """The camera paths of a pass, where some pixels may have any.
 
-    Their expected number is rounded up or down at random, so that its mean is kept: alike where pixels share a key, one
-    above their own numbers else; all others by one running sum, whose whole numbers they are the steps of (systematic
-    sampling, Madow and Madow 1944).
+    Their expected number is rounded up or down at random, so that its mean is kept: together where pixels are alike;
+    all others by one running sum, whose whole numbers they are the steps of (systematic sampling, Madow and Madow
+    1944).
     """
     pixels, starts = np.empty(active.shape[0], np.int32), np.empty(active.shape[0] + 1, np.int32)
-    alike = np.empty(keys.shape[0], np.int32)
-    n = drawn = 0
+    keyed = alike.lines > 0
+    keys = np.empty(active.shape[0] if keyed else 0, np.int32)
+    n = drawn = k = 0
     starts[0] = 0
     carried = uniform(seed, 0, 0, 92)
     for i in range(active.shape[0]):
         pixel = active[i]
-        key = keys[i] if keys.shape[0] > 0 else pixel
-        # a pixel's own key is above its number, that of a line is not (`line_paths.alike_on_a_line`)
-        if keys.shape[0] > 0 and key <= pixel:
+        while k < alike.pixel.shape[0] and alike.pixel[k] < pixel:
+            k += 1
+        key = pixel + alike.lines
+        if k < alike.pixel.shape[0] and alike.pixel[k] == pixel:
+            key = alike.line[k]
             count = int(camera_paths[pixel] + uniform(seed, key, 0, 92))
         else:
             carried += camera_paths[pixel]
@@ -322,9 +340,9 @@ def draw_camera_paths(camera_paths: Float, active: Int, keys: Int, seed: int) ->
             carried -= count
         if count > 0:
             pixels[n] = pixel
-            if keys.shape[0] > 0:
-                alike[n] = key
+            if keyed:
+                keys[n] = key
             drawn += count
             n += 1
             starts[n] = drawn
-    return DrawnPaths(pixels[:n], alike[: n if keys.shape[0] > 0 else 0], starts[: n + 1])
+    return DrawnPaths(pixels[:n], keys[: n if keyed else 0], starts[: n + 1])

@@ -24,11 +24,12 @@ from render.camera.camera import Camera
 from render.importance import Importance
 from render.laser.laser import LineLaser
 from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, PASSES_A_WAVE, Accumulator, sum_looks
-from render.laser_indirect.bdpt_pass import KINDS, NO_KEYS, BdptPass, Sampling
+from render.laser_indirect.bdpt_pass import KINDS, BdptPass, Sampling
 from render.laser_indirect.clear_light import NO_LIGHT, ClearLight, clear_light
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.guiding import (
     BINS,
+    NO_KEYS,
     NO_PIXELS,
     active_pixels,
     allocate_camera_paths,
@@ -121,11 +122,12 @@ def indirect_images(
 ) -> Iterator[IndirectImage]:
     """Radiance of one laser's light after two or more surfaces, to a target relative RMS error. Raises Cancelled.
 
-    An image at every doubling of the paths, and the final one. The error is that of the whole image: sqrt(sum of
-    variances / sum of squares); with an aim it is enough that the measured line is known. `most_paths`, or the end of
-    the time, ends it in any case. kinds: of light, besides plain interreflection (`render.laser_indirect.path_vertex`).
-    clamp: most radiance of one pass in one pixel, W/(m^2 sr); biased. left: lasers that have their share of the time,
-    with this one. Resumed it gives the image of an uninterrupted run; what it keeps is whole when Cancelled is raised.
+    An image at every doubling of the paths, where somebody watches, and the final one. The error is that of the whole
+    image: sqrt(sum of variances / sum of squares); with an aim it is enough that the measured line is known.
+    `most_paths`, or the end of the time, ends it in any case. kinds: of light, besides plain interreflection
+    (`render.laser_indirect.path_vertex`). clamp: most radiance of one pass in one pixel, W/(m^2 sr); biased. left:
+    lasers that have their share of the time, with this one. Resumed it gives the image of an uninterrupted run; what it
+    keeps is whole when Cancelled is raised.
     """
     world, camera, laser, _, T_world_laser = placed
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
@@ -202,18 +204,20 @@ def indirect_images(
         run.progress(min(0.99, done))
         if time_is_over():
             break
-        if so_far.paths >= 2 * shown and unfinished():
+        if run.watched and so_far.paths >= 2 * shown and unfinished():
             shown = so_far.paths
             yield image()
     run.teach(run.part, ReflectedLesson.of(so_far))
+    # before there is one more image: they are the largest part of the memory
+    waves.buffers.clear()
     yield image()
 
 
 def with_lone_spread(so_far: Accumulator, shape: tuple[int, int]) -> tuple[Float32, float | None]:
     """(h, w) radiance so far, with the peaks of single passes spread, and the share of it that was; None: no line is
     the goal."""
-    radiance, lone = so_far.radiance(shape), so_far.lone(shape)
-    return radiance, None if lone is None else spread_lone(radiance, lone)
+    radiance, lone = so_far.radiance(shape), so_far.lone()
+    return radiance, None if lone is None else spread_lone(radiance, *lone)
 
 
 class Waves:
@@ -310,9 +314,9 @@ def refine_guiding(first: Accumulator, buffers: list[PassBuffer], wave_moments: 
     first.guide_camera(camera_radiance, float(PASSES_A_WAVE))
 
 
-def arrived_paths(camera_radiance: Float32) -> Float:
+def arrived_paths(camera_radiance: Float32) -> Float32:
     """(pixels,) roughly how many light paths of a first look came to each."""
-    paths, arrived = np.zeros(len(camera_radiance)), nonzero_places(camera_radiance)
+    paths, arrived = np.zeros(len(camera_radiance), np.float32), nonzero_places(camera_radiance)
     radiance = camera_radiance[arrived].astype(np.float64)
     paths[arrived] = radiance * (PASSES_A_WAVE * LOOK_PATHS / max(float(radiance.sum()), 1e-300))
     return paths
@@ -333,7 +337,7 @@ def camera_reachable_share(buffers: list[PassBuffer]) -> tuple[float, Float32]:
 def sampling_of(so_far: Accumulator, light_paths: int) -> Sampling:
     """How the next passes sample, by what the passes so far have found."""
     active, line = active_pixels(so_far.camera_paths), so_far.line
-    keys = NO_KEYS if line is None or line.out_of_reach else alike_on_a_line(active, line.projection)
+    keys = NO_KEYS if line is None or line.out_of_reach else alike_on_a_line(line.projection)
     return Sampling(light_paths, so_far.fan, so_far.camera_paths, active, so_far.guide, keys)
 
 
@@ -364,9 +368,9 @@ def empty_buffer(pixels: int) -> PassBuffer:
     return PassBuffer(np.zeros(pixels, np.float32), np.zeros(pixels, np.float32), *zeros, np.zeros(1), touched)
 
 
-def first_camera_paths(specular: Bool, camera: Camera, count: int) -> Float:
+def first_camera_paths(specular: Bool, camera: Camera, count: int) -> Float32:
     """(pixels,) camera paths of a first look: at most `count`, on what the camera sees of mirrors and clear glass."""
-    camera_paths = np.zeros(camera.width * camera.height)
+    camera_paths = np.zeros(camera.width * camera.height, np.float32)
     if len(specular):
         camera_paths[specular] = min(1.0, count / max(int(specular.sum()), 1))
     return camera_paths

@@ -71,7 +71,7 @@ class ReflectedLesson:
     ) -> Accumulator | None:
         """An empty accumulator of another frame, whose fan is uniform so far; None: its image is another."""
         pixels = len(self.camera_radiance)
-        images = np.zeros(pixels), np.zeros(pixels), self.camera_radiance.copy()
+        images = np.zeros(pixels, np.float32), np.zeros(pixels), self.camera_radiance.copy()
         if importance.laser[laser].size != pixels:
             return None
         found = Accumulator(

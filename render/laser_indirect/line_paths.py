@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from render.base.arrays import Float, Float32, Int
+from render.base.arrays import Float, Float32
 from render.laser_indirect.connection_buffer import BLOCK
-from render.laser_indirect.guiding import MOST_CAMERA_PATHS
+from render.laser_indirect.guiding import MOST_CAMERA_PATHS, AlikePixels
 from render.laser_indirect.line_goal import Projection, all_but_unmet
 from render.laser_indirect.line_pools import POOLED, pooled
 from render.laser_indirect.line_sums import block_sums, scale_blocks, weigh_blocks
@@ -48,7 +48,7 @@ class PathDemand:
         return cls(np.zeros(len(projection.lit)), np.zeros(len(projection.peaks)))
 
     def learned(
-        self, projection: Projection, variance: tuple[Float, Float32], camera_paths: Float, size: float
+        self, projection: Projection, variance: tuple[Float, Float32], camera_paths: Float32, size: float
     ) -> PathDemand:
         """With what passes of some size tell.
 
@@ -65,7 +65,7 @@ class PathDemand:
             blocks = blocks + share * (found - blocks)
         return PathDemand(self.lines + share * (lines - self.lines), blocks, self.size + size)
 
-    def aim(self, camera_paths: Float, projection: Projection, width: int, count: float) -> None:
+    def aim(self, camera_paths: Float32, projection: Projection, width: int, count: float) -> None:
         """Radiance that is expected of each pixel (pixels,) -> its camera paths, `count` in all, where errors matter.
 
         Where none does light tracing alone remains.
@@ -102,14 +102,9 @@ class PathDemand:
         return np.asarray(np.minimum(needed, all_but_unmet(largest)))
 
 
-def alike_on_a_line(active: Int, projection: Projection) -> Int:
-    """(n,) pixels in order -> the key of each: the same for all that a scan line is measured on, else their own."""
-    keys = active + np.int32(len(projection.lit))
-    if len(active):
-        place = np.minimum(np.searchsorted(active, projection.pixel), len(active) - 1)
-        there = active[place] == projection.pixel
-        keys[place[there]] = projection.line[there]
-    return keys
+def alike_on_a_line(projection: Projection) -> AlikePixels:
+    """All pixels that a scan line is measured on have its random numbers."""
+    return AlikePixels(projection.pixel, projection.line, len(projection.lit))
 
 
 def _factors(sums: Float, of_blocks: Float) -> Float:

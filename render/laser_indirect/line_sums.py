@@ -18,21 +18,21 @@ SMOOTHED_ROWS = 128
 """Rows of an image that a thread smooths at a time, at least."""
 
 
-def block_sums(values: Float, blocks: int) -> Float:
+def block_sums(values: Float32, blocks: int) -> Float:
     """(pixels,) -> (blocks,)."""
     out = np.empty(blocks)
     map_chunks(partial(_block_sums, values, out), blocks, BLOCKS_A_CHUNK)
     return out
 
 
-def weigh_blocks(values: Float, weight: Float32) -> Float:
+def weigh_blocks(values: Float32, weight: Float32) -> Float:
     """Multiply (pixels,), mostly zeros, by weights (blocks, BLOCK) -> (blocks,) sums of what becomes of them."""
     out = np.empty(len(weight))
     map_chunks(partial(_weigh_blocks, values, weight, out), len(out), BLOCKS_A_CHUNK)
     return out
 
 
-def scale_blocks(values: Float, factors: Float, most: float) -> None:
+def scale_blocks(values: Float32, factors: Float, most: float) -> None:
     """Multiply (pixels,), mostly zeros, by the factor of each block (blocks,), to `most` at most."""
     map_chunks(partial(_scale_blocks, values, factors, most), len(factors), BLOCKS_A_CHUNK)
 
@@ -63,7 +63,7 @@ def mean_image(buffers: list[PassBuffer]) -> Float32:
 
 # what is zero is only read: its memory may not have been given by the system yet
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def _block_sums(values: Float, out: Float, start: int, stop: int) -> None:
+def _block_sums(values: Float32, out: Float, start: int, stop: int) -> None:
     for block in range(start, stop):
         total = 0.0
         for pixel in range(block * BLOCK, min((block + 1) * BLOCK, values.shape[0])):
@@ -72,7 +72,7 @@ def _block_sums(values: Float, out: Float, start: int, stop: int) -> None:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def _weigh_blocks(values: Float, weight: Float32, out: Float, start: int, stop: int) -> None:
+def _weigh_blocks(values: Float32, weight: Float32, out: Float, start: int, stop: int) -> None:
     for block in range(start, stop):
         total, first = 0.0, block * BLOCK
         for k in range(min(BLOCK, values.shape[0] - first)):
@@ -83,7 +83,7 @@ def _weigh_blocks(values: Float, weight: Float32, out: Float, start: int, stop: 
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def _scale_blocks(values: Float, factors: Float, most: float, start: int, stop: int) -> None:
+def _scale_blocks(values: Float32, factors: Float, most: float, start: int, stop: int) -> None:
     for block in range(start, stop):
         for pixel in range(block * BLOCK, min((block + 1) * BLOCK, values.shape[0])):
             if values[pixel] != 0.0:

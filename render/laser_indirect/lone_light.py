@@ -14,8 +14,7 @@ from functools import partial
 import numba
 import numpy as np
 
-from render.base.arrays import Bool, Float, Float32
-from render.base.nonzero import nonzero_places
+from render.base.arrays import Bool, Float, Float32, Int
 from render.base.threads import map_chunks
 from render.importance import CELL
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
@@ -34,22 +33,30 @@ def keep_largest(buffers: list[PassBuffer], largest: Float32, weight: float, mos
     map_chunks(partial(_keep_largest, images, touched, weight, most, largest), len(touched[0]), BLOCKS_A_CHUNK)
 
 
-def lone_light(total: Float, largest: Float32, weight: float, projection: Projection) -> Float32:
-    """(pixels,) radiance that one pass alone found and that is a peak beside the line, of sums over all passes
-    (pixels,) and the brightest of them, with the weight of all."""
-    out, line = np.zeros(len(total), np.float32), np.zeros(len(total), np.bool_)
+def lone_light(total: Float, largest: Float32, weight: float, projection: Projection) -> tuple[Int, Float32]:
+    """(n,) pixels, and the radiance there that one pass alone found and that is a peak beside the line, of sums over
+    all passes (pixels,) and the brightest of them, with the weight of all."""
+    line = np.zeros(len(total), np.bool_)
     line[projection.pixel] = True
-    work = partial(_find_lone, total, largest, 1.0 / weight, projection.peaks, line, out)
-    map_chunks(work, len(projection.peaks), BLOCKS_A_CHUNK)
-    return out
+    blocks = len(projection.peaks)
+    found = [(np.zeros(0, np.int32), np.zeros(0, np.float32))] * max(1, -(-blocks // BLOCKS_A_CHUNK))
+
+    def work(start: int, stop: int) -> None:
+        places, light = np.empty((stop - start) * BLOCK, np.int32), np.empty((stop - start) * BLOCK, np.float32)
+        n = _find_lone((total, largest), 1.0 / weight, projection.peaks, line, (places, light), start, stop)
+        found[start // BLOCKS_A_CHUNK] = places[:n].copy(), light[:n].copy()
+
+    map_chunks(work, blocks, BLOCKS_A_CHUNK)
+    places, light = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return places, light
 
 
-def spread_lone(radiance: Float32, lone: Float32) -> float:
-    """Smooth, in place, the part `lone` of radiance (h, w) over SPREAD_SIGMA, and return its share; the sum stays."""
-    places = nonzero_places(lone)
+def spread_lone(radiance: Float32, places: Int, light: Float32) -> float:
+    """Smooth, in place, the part of radiance (h, w) that is `light` in some pixels (n,) over SPREAD_SIGMA, and return
+    its share; the sum stays."""
     if len(places) == 0:
         return 0.0
-    (height, width), light = radiance.shape, lone.ravel()[places]
+    height, width = radiance.shape
     moved, whole = float(light.sum(dtype=np.float64)), float(radiance.sum(dtype=np.float64))
     flat = radiance.reshape(-1)
     flat[places] = np.maximum(flat[places] - light, 0.0)
@@ -94,8 +101,16 @@ def _keep_largest(
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def _find_lone(
-    total: Float, largest: Float32, scale: float, peaks: Float32, line: Bool, out: Float32, start: int, stop: int
-) -> None:
+    sums: tuple[Float, Float32],
+    scale: float,
+    peaks: Float32,
+    line: Bool,
+    out: tuple[Int, Float32],
+    start: int,
+    stop: int,
+) -> int:
+    """Of blocks start .. stop, by the sums over all passes and the largest, pixels and their light -> out; how many."""
+    (total, largest), (places, light), n = sums, out, 0
     for block in range(start, stop):
         for first in range(block * BLOCK, min((block + 1) * BLOCK, total.shape[0]), CELL):
             last = min(first + CELL, total.shape[0])
@@ -107,4 +122,7 @@ def _find_lone(
                 measured |= line[pixel]
             if risen >= 1.0 > without and not measured:
                 for pixel in range(first, last):
-                    out[pixel] = scale * largest[pixel]
+                    if largest[pixel] > 0.0:
+                        places[n], light[n] = pixel, scale * largest[pixel]
+                        n += 1
+    return n

@@ -18,6 +18,7 @@ from render.base.threads import Cancel, thread_count
 from render.checkpoint import RenderState
 from render.frame import Frame
 from render.lessons import Lessons
+from render.run import unseen
 from render.world.world import World
 from studio.scan.blocks import Blocks
 from studio.scan.interrupt import stop_on_interrupt
@@ -99,7 +100,7 @@ def _at_once(scan: Scan, first: World, count: int, at_once: int, blocks: Blocks)
         teacher, clock = blocks.first_of(step), Clock(progress, lambda: ended.is_set() or cancelled())
         # of a single block all others wait for the first
         options = replace(scan.options, threads=threads if step == 0 and not several else threads // at_once)
-        part = replace(scan, clock=clock, options=options, refined=lambda frame: None)
+        part = replace(scan, clock=clock, options=options, refined=unseen)
         world = moved_world(scan.project, step, first)
         if teacher != step and (under_way := futures.get(teacher)) is not None:
             wait((under_way,))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from analysis.report.frame_result import FrameResult
 from render.base.threads import Cancel
 from render.frame import Frame
-from render.run import Run, never
+from render.run import Run, never, unseen
 from studio.project.project import Project
 from studio.runtime.console import StageProgress, silent
 from studio.scan.depth_noise import DepthNoise
@@ -56,7 +56,7 @@ class Listener:
     cancelled: Cancel = never
     foreseen: Callable[[tuple[DepthNoise, ...]], None] = lambda noise: None
     """Hears, before anything but pilots is rendered, of the noise that rendering may add to the depth."""
-    refined: Callable[[Frame], None] = lambda frame: None
+    refined: Callable[[Frame], None] = unseen
     """Hears of every frame as it gets better."""
     measured: Callable[[FrameResult], None] = lambda result: None
     """Hears of every frame once it is measured."""

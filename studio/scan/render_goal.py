@@ -158,6 +158,7 @@ def _weigh(
         settings = settings.model_copy(update={"pattern": image.pattern})
     # of a selection the candidates' method is the one that measured them
     derivative = influence(image.pixels, line, settings, noise, threads, shared=True)
+    del image  # as large as what is written from here on
     valid = line.valid
     # the pilots of a scan have no exact line: they ask for no less
     stray = strays(line, frame.curves[laser]) if frame.curves else np.zeros(len(valid), np.bool_)

@@ -19,7 +19,7 @@ from render.base.errors import Cancelled
 from render.base.progress import Clock as RenderClock
 from render.base.threads import Cancel
 from render.frame import Frame
-from render.run import Run, never
+from render.run import Run, never, unseen
 from render.scene.motion import NoMotion
 from render.scene.settings import DepthGoal
 from render.sensor.develop import Image
@@ -132,7 +132,7 @@ def render_step(
     clock: Clock,
     run: Run = Run(),
     *,
-    refined: Callable[[Frame], None] = lambda frame: None,
+    refined: Callable[[Frame], None] = unseen,
     scan: ScanPlan | None = None,
 ) -> Frame:
     """Radiance and truth of one step, with the project's seed; stopped by the run, or unless it can be by the clock.
@@ -142,7 +142,8 @@ def render_step(
     from render.progressive import frames  # takes a while, and a window opens before anything is rendered
 
     cancelled = clock.cancelled if run.cancelled is never else run.cancelled
-    run = replace(run, seed=project.seed, cancelled=cancelled, goal=goal_of(project, run.threads))
+    goal, watched = goal_of(project, run.threads), refined is not unseen
+    run = replace(run, seed=project.seed, cancelled=cancelled, goal=goal, watched=watched)
     placed, watch = PlacedScene(world, project.scene, step), RenderClock(clock.progress)
     for frame in frames(placed, project.render_settings, run, watch, axis=project.extraction.axis, scan=scan):
         refined(frame)

@@ -27,7 +27,7 @@ def nothing(pixels=8, size=100, most=8):
         4 if size > 100 else 1 << 20,
         0.0,
         NO_PIXELS,
-        np.zeros(pixels),
+        np.zeros(pixels, np.float32),
         no_guide(CAMERA),
         *arrays,
     )

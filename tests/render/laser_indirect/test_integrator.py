@@ -248,7 +248,8 @@ def flux_of(parts, camera_paths, passes=16):
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
     task = BdptPass.of(PlacedLaser(world, camera, laser, T_world_camera, T_world_laser), reach, 3)
     pixels = camera.width * camera.height
-    expected, active = np.full(pixels, camera_paths / pixels), np.arange(pixels if camera_paths else 0, dtype=np.int32)
+    expected = np.full(pixels, camera_paths / pixels, np.float32)
+    active = np.arange(pixels if camera_paths else 0, dtype=np.int32)
     sampling = Sampling(1 << 14, uniform_fan(low, high), expected, active, no_guide(camera))
     sums = []
     for number in range(passes):

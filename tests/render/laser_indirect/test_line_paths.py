@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from render.base.arrays import Float, Int
+from render.base.arrays import Float
 from render.importance import Importance
 from render.laser_direct.integrator import direct_image
-from render.laser_indirect.bdpt_pass import NO_KEYS, BdptPass, Sampling
-from render.laser_indirect.guiding import active_pixels, draw_camera_paths, no_guide
+from render.laser_indirect.bdpt_pass import BdptPass, Sampling
+from render.laser_indirect.guiding import NO_KEYS, AlikePixels, active_pixels, draw_camera_paths, no_guide
 from render.laser_indirect.integrator import empty_buffer
 from render.laser_indirect.line_goal import Projection
 from render.laser_indirect.line_paths import PathDemand, alike_on_a_line
@@ -44,7 +44,7 @@ def test_a_line_that_needs_four_times_the_paths_gets_them() -> None:
     # of twice the paths twice the variance: four times the need
     variance = np.where(np.arange(HEIGHT) < HEIGHT // 2, 2.0, 1.0)
     demand = PathDemand.none(projection).learned(projection, (variance, np.zeros((0, 16), np.float32)), drawn, 1.0)
-    paths = np.ones(HEIGHT * WIDTH)
+    paths = np.ones(HEIGHT * WIDTH, np.float32)
     demand.aim(paths, projection, WIDTH, 1000.0)
     image = paths.reshape(HEIGHT, WIDTH)
     # the windows of the lines on either side of the step are mixed
@@ -67,9 +67,9 @@ def test_peaks_get_paths_where_they_vary_and_some_wherever_there_is_light() -> N
     projection = Projection.of(importance(peaks=0.5), 0)
     rises = np.zeros((len(projection.peaks), 16), np.float32)
     rises[10:20, 3] = 2.0
-    drawn = np.ones(HEIGHT * WIDTH)
+    drawn = np.ones(HEIGHT * WIDTH, np.float32)
     demand = PathDemand.none(projection).learned(projection, (np.zeros(HEIGHT), rises), drawn, 1.0)
-    paths = np.ones(HEIGHT * WIDTH)
+    paths = np.ones(HEIGHT * WIDTH, np.float32)
     demand.aim(paths, projection, WIDTH, 1000.0)
     image = paths.reshape(HEIGHT, WIDTH)
     assert np.all(np.delete(image, LINE, axis=1) > 0.0)
@@ -79,8 +79,9 @@ def test_peaks_get_paths_where_they_vary_and_some_wherever_there_is_light() -> N
 def test_pixels_of_a_line_have_a_key_in_common_and_others_their_own() -> None:
     projection = Projection.of(importance(), 0)
     active = np.arange(0, HEIGHT * WIDTH, 3, dtype=np.int32)
-    keys = alike_on_a_line(active, projection)
-    on = np.isin(active, projection.pixel)
+    found = draw_camera_paths(np.ones(HEIGHT * WIDTH, np.float32), active, alike_on_a_line(projection), 0)
+    keys, on = found.keys, np.isin(active, projection.pixel)
+    assert np.array_equal(found.pixels, active)
     assert np.array_equal(keys[on], active[on] // WIDTH)
     assert len(np.unique(keys[~on])) == np.sum(~on) and keys[~on].min() >= HEIGHT
 
@@ -105,7 +106,7 @@ def window_about_the_line(groove: PlacedLaser) -> tuple[Float, Projection]:
     apart = np.arange(width) - centre[:, None]
     weight = np.where(np.abs(apart) <= 6, apart, 0).astype(np.float32)
     weight[(weight == 0.0) & (apart == 0)] = 1e-6
-    paths = (weight != 0.0).astype(np.float64).ravel()
+    paths = (weight != 0.0).astype(np.float32).ravel()
     return paths, Projection.of(Importance((weight,), np.abs(weight)), 0)
 
 
@@ -116,7 +117,7 @@ def test_shared_random_numbers_move_lines_less_and_leave_every_pixel_unbiased(gr
     camera_paths, projection = paths
     active, passes = active_pixels(camera_paths), 64
 
-    def images(keys: Int, first: int) -> Float:
+    def images(keys: AlikePixels, first: int) -> Float:
         sampling = Sampling(1 << 11, uniform_fan(low, high), camera_paths, active, no_guide(groove.camera), keys)
         found = []
         for number in range(first, first + passes):
@@ -125,7 +126,7 @@ def test_shared_random_numbers_move_lines_less_and_leave_every_pixel_unbiased(gr
             found.append(buffer.image)
         return np.array(found)
 
-    own, shared = images(NO_KEYS, 0), images(alike_on_a_line(active, projection), passes)
+    own, shared = images(NO_KEYS, 0), images(alike_on_a_line(projection), passes)
     light = [np.bincount(projection.line, one.mean(axis=0)[projection.pixel]) for one in (own, shared)]
     # a part of the plate that sees no other is dark
     bright = np.flatnonzero(np.minimum(*light) > 0.02 * np.max(light))
@@ -153,7 +154,7 @@ def test_shared_random_numbers_move_lines_less_and_leave_every_pixel_unbiased(gr
 def test_camera_paths_are_drawn_as_often_as_expected_and_in_all_to_one_path_of_their_sum() -> None:
     """Systematic sampling: each pixel by its own expectation, the whole as near to its own as whole numbers allow."""
     rng = np.random.default_rng(8)
-    expected = rng.random(400) ** 4 * 3.0
+    expected = (rng.random(400) ** 4 * 3.0).astype(np.float32)
     active, repeats = np.arange(400, dtype=np.int32), 4000
     drawn = np.zeros((repeats, 400))
     for seed in range(repeats):
@@ -169,9 +170,8 @@ def test_camera_paths_are_drawn_as_often_as_expected_and_in_all_to_one_path_of_t
 
 
 def test_pixels_of_a_line_are_drawn_alike() -> None:
-    expected, active = np.full(64, 0.3), np.arange(64, dtype=np.int32)
-    keys = active + np.int32(8)
-    keys[8:24] = 1
+    expected, active = np.full(64, 0.3, np.float32), np.arange(64, dtype=np.int32)
+    alike = AlikePixels(active[8:24], np.ones(16, np.int32), 8)
     for seed in range(50):
-        found = draw_camera_paths(expected, active, keys, seed)
+        found = draw_camera_paths(expected, active, alike, seed)
         assert np.isin(np.arange(8, 24), found.pixels).sum() in (0, 16)
