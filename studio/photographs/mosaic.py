@@ -14,10 +14,10 @@ lower half, in which noise has no part. In px, with one standard error of the fi
                    rounded, px^2 DN    filled in, px^2    clipped up to 255 DN, px^2    at 510 DN and more
     luminance      0 to 1.2 (0.4)      0.018 (0.012)      0.084 (0.003)                 0.129 (0.011)
     green          3.4 (0.3)           0.000 (0.009)      0.060 (0.007)                 0.148 (0.013)
-    red            5.3 (0.6)           0.087 (0.017)      0.278 (0.008)                 0.337 (0.028)
-    blue           6.6 (0.7)           0.075 (0.026)      0.279 (0.008)                 0.414 (0.030)
+    red            6.9 (0.9)           0.076 (0.024)      0.300 (0.013)                 0.353 (0.032)
+    blue           7.6 (1.0)           0.105 (0.022)      0.302 (0.013)                 0.377 (0.035)
 
-of all lasers together; the laser's own red or blue, where it is clipped, 0.30 (0.013) and 0.36 (0.025).
+luminance and green of all lasers together, red and blue of their own.
 
 A line that crosses the mosaic slantwise meets all of its places: what a cubic does not follow of that wave has told
 itself by the scatter along the line (`analysis/line/shared_noise.py`).
@@ -42,9 +42,9 @@ ROUNDED: dict[Channel, tuple[float, float]] = {
     "luminance": (1.0, 0.02),
     "green": (3.4, 0.02),
     "mono": (3.4, 0.02),
-    "red": (6.5, 0.08),
-    "blue": (6.5, 0.08),
-    "difference": (13.0, 0.16),
+    "red": (7.3, 0.09),
+    "blue": (7.3, 0.09),
+    "difference": (14.6, 0.18),
 }
 """px^2 DN over the line's width in px and its height in DN, and px^2 over its width, by the channel that measures. A
 sum of colours was not measured and is taken as green, a difference of them as twice the worse."""

@@ -181,7 +181,7 @@ def _measured(
         if found.valid.any() and not line.valid.any():
             return Measured(no_line(whole.shape, settings, NO_LINE), whole, light.image, corner, noise)
     line = _no_wider(with_shared_noise(line), line) if shared else line
-    line = smooth_along(line) if look.settings.smooth_along else line
+    line = smooth_along(line, look.longest) if look.settings.smooth_along else line
     line = with_mosaic(line, look.channel, noise.gain) if taken.lossy else line
     return Measured(replace(line, note=note_of(line, settings, [])), whole, light.image, corner, noise)
 
