@@ -41,9 +41,10 @@ TRIED = 3
 """Photographs on which channels are compared."""
 NEARBY = 2.5
 """Scan lines, the longest smoothing along the line that nobody asked for. White noise falls as in a mean over 9, and
-neighbours a JPEG's block apart err for themselves. Of rendered photographs errors within 6 scan lines of corners and
-steps are least at 1 to 4, and all errors on folded and stepped surfaces within a twentieth of the least from 2 on; only
-planes and other smooth surfaces gain by more (12 scenes, 40 draws of noise and place each)."""
+neighbours a JPEG's block apart err nearly for themselves. Of rendered photographs errors within 6 scan lines of corners
+and steps are within a twentieth of their least, which longer ones exceed by up to a quarter, and all errors on folded
+and stepped surfaces within a tenth; planes and other smooth surfaces gain by more, up to two fifths (12 scenes, 40
+draws of noise and place each, `tests/validation/photograph_draws.py`)."""
 KEPT = 2**28
 """Bytes of photographs that are kept in memory from looking to measuring."""
 
