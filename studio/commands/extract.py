@@ -127,7 +127,7 @@ def _prepared(images: tuple[Path, ...], options: ImageOptions, given: dict[str, 
     """Raises InputError, which names the option."""
     from analysis.line.extract import settings_of
     from studio.commands.places import load_project
-    from studio.photographs.photograph_set import Look, look_at
+    from studio.photographs.photograph_set import NEARBY, Look, look_at
     from studio.scan.line_extraction import working_volume
 
     laser = options.laser_number
@@ -138,6 +138,7 @@ def _prepared(images: tuple[Path, ...], options: ImageOptions, given: dict[str, 
         wishes = replace(wishes, count_lines=True)
     if given.get("smooth_along") is None and given["select"] == "continuous":
         given["smooth_along"] = not (options.spacetime or options.ridges or options.hdr)
+        wishes = replace(wishes, longest=NEARBY)
     settings, volume = settings_of(None, channel=wishes.colour, axis=wishes.axis, **given), None
     if settings.geometry:
         if options.project is None:

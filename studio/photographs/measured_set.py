@@ -12,7 +12,7 @@ from analysis.line.extract import settings_of
 from analysis.line.result import Flag
 from render.base.errors import InputError
 from studio.photographs.evidence_words import CONTROLS
-from studio.photographs.photograph_set import Look, Wishes, look_at
+from studio.photographs.photograph_set import NEARBY, Look, Wishes, look_at
 from studio.photographs.photographs import Measured, extract_photograph
 
 OPTIONS_AS_CONTROLS = {"--off": "laser-off images", "--roi": "rectangle"}
@@ -67,7 +67,7 @@ def measured_set(
     """
     settings = settings_of(None, select="continuous", smooth_along=True)
     try:
-        found = MeasuredSet(look_at(paths, settings, replace(wishes, count_lines=True, words=CONTROLS)))
+        found = MeasuredSet(look_at(paths, settings, replace(wishes, count_lines=True, longest=NEARBY, words=CONTROLS)))
     except InputError as error:
         raise _in_controls(error) from None
     for number, path in enumerate(paths):

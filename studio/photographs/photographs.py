@@ -27,6 +27,7 @@ from render.base.arrays import Float
 from render.base.errors import InputError
 from render.camera.camera import Camera
 from studio.photographs.bands import about, bands, course
+from studio.photographs.blur_along import with_blur_along
 from studio.photographs.candidates import peaks_to_choose_from
 from studio.photographs.choice import carried_on, selected
 from studio.photographs.completion import FILLED
@@ -38,7 +39,7 @@ from studio.photographs.light import Light, without
 from studio.photographs.line_arrays import changed, column
 from studio.photographs.line_ends import Tone, ended
 from studio.photographs.mosaic import with_mosaic
-from studio.photographs.photograph_set import Look
+from studio.photographs.photograph_set import NEARBY, Look
 from studio.photographs.pieces import NO_LINE, lines_only
 from studio.photographs.second_look import looked_at_again
 from studio.scan.line_extraction import note_of
@@ -181,8 +182,10 @@ def _measured(
         if found.valid.any() and not line.valid.any():
             return Measured(no_line(whole.shape, settings, NO_LINE), whole, light.image, corner, noise)
     line = _no_wider(with_shared_noise(line), line) if shared else line
-    line = smooth_along(line) if look.settings.smooth_along else line
-    line = with_mosaic(line, look.channel, noise.gain) if taken.lossy else line
+    line = smooth_along(line, look.longest) if look.settings.smooth_along else line
+    if taken.lossy:
+        course = line if look.settings.smooth_along else smooth_along(line, NEARBY)
+        line = with_mosaic(with_blur_along(line, course), look.channel, noise.gain)
     return Measured(replace(line, note=note_of(line, settings, [])), whole, light.image, corner, noise)
 
 

@@ -89,6 +89,10 @@ def selecting(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 SMOOTH_ALONG = "Estimate positions with their neighbours on the line; steps and corners are kept."
+SMOOTH_PHOTOGRAPHS = (
+    "Estimate positions with their neighbours, as far along the line as it is smooth, or not at all; steps and corners "
+    "are kept  [default: over 2.5 scan lines at most]."
+)
 
 
 def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -156,7 +160,7 @@ def extracting(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--ridges", is_flag=True, help="Lines of any direction, as points with their normal (2-D Steger)."
         ),
-        click.option("--smooth-along/--no-smooth-along", default=None, help=SMOOTH_ALONG),
+        click.option("--smooth-along/--no-smooth-along", default=None, help=SMOOTH_PHOTOGRAPHS),
         click.option("--overlay", is_flag=True, help="Write a picture of each image with its line beside the table."),
         click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene: 8,2,0.5. One table."),
         selecting,

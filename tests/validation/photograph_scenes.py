@@ -38,6 +38,8 @@ NEAR = 2.0
 """px, or the line's own sigma if that is more: farther off the truth a position is false."""
 PEAK = 0.95
 """Quantile of the line's peaks that `level` speaks of."""
+BESIDE = 64
+"""px beside an image that a moved line may leave it by."""
 MRAD_PER_PX = 2.4e-3
 """Full angle of a sheet whose line is 1 px in sigma, of the templates at `SCALE`."""
 
@@ -109,9 +111,20 @@ class Score:
     """None: nothing was measured."""
 
 
-def photograph(trouble: Trouble, seed: int = 1) -> Photograph:
+@dataclass(frozen=True)
+class Place:
+    """Where the line is drawn: it is moved along its scan lines, and leans."""
+
+    shift: float = 0.0
+    """px, on the middle scan line."""
+    slope: float = 0.0
+    """px a scan line, more than rendered."""
+
+
+def photograph(trouble: Trouble, seed: int = 1, place: Place | None = None) -> Photograph:
     """The image that the sensor takes of the rendered template."""
     project, frame = _rendered(trouble.template, trouble.sigma, trouble.lasers, trouble.roll, trouble.glossy)
+    frame = frame if place is None else _moved(frame, place)
     scene, truth = project.scene, tuple(map(_middles, frame.curves))
     if trouble.level_line:
         scene, frame = _turned(scene, frame)
@@ -148,6 +161,24 @@ def _rendered(template: str, sigma: float, lasers: int, roll: float, glossy: boo
     clock = Clock(lambda stage, done: None, lambda: False)
     frame = render_step(project, build_world(scene, folder, 0), 0, clock, Run(threads=2))
     return project, frame
+
+
+def _moved(frame: Frame, place: Place) -> Frame:
+    """The laser's light and truth elsewhere on their rows, exactly (Fourier), as light is smooth across the line."""
+    height, width = frame.laser(0).shape
+    shift = place.shift + place.slope * (np.arange(height) - 0.5 * height)
+    turns = np.exp(-2j * np.pi * shift[:, None] * np.fft.rfftfreq(width + 2 * BESIDE))
+
+    def move(light: np.ndarray) -> np.ndarray:
+        spectrum = np.fft.rfft(np.pad(light.astype(np.float64), ((0, 0), (BESIDE, BESIDE))), axis=1)
+        whole = np.fft.irfft(spectrum * turns, width + 2 * BESIDE, axis=1)
+        return np.maximum(whole[:, BESIDE:-BESIDE], 0.0).astype(np.float32)
+
+    direct = tuple(move(frame.laser(i)) for i in range(len(frame.laser_direct)))
+    curves = tuple(
+        replace(curve, position=curve.position + shift[np.asarray(curve.index, np.intp)]) for curve in frame.curves
+    )
+    return replace(frame, laser_direct=direct, laser_indirect=(), curves=curves)
 
 
 def _middles(curve) -> np.ndarray:
@@ -200,23 +231,33 @@ def measured(path: Path, folder: Path, *options: str) -> tuple[dict, np.ndarray]
     return told, np.stack([*pair, sigma], axis=1)
 
 
-def score(taken: Photograph, told: dict, positions: np.ndarray) -> Score:
-    """Positions (n, 3) against the truth."""
-    colour = told.get("colour")
-    near = max(NEAR, taken.sigma)
+def nearest(taken: Photograph) -> float:
+    """px, below which a position is right."""
+    return max(NEAR, taken.sigma)
+
+
+def off_by(taken: Photograph, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (n, 3) -> (n,) px off the nearest crossing of the truth, inf where there is none, and which of the
+    truth's crossings have a right one."""
     truth = np.concatenate(taken.truth)
-    if told["axis"] != taken.axis or not len(positions):
-        return Score(0.0, 1.0 if len(positions) else 0.0, math.nan, math.nan, told["axis"], colour)
-    error = np.full(len(positions), np.inf)
-    reached = np.zeros(len(truth), np.bool_)
+    error, reached = np.full(len(positions), np.inf), np.zeros(len(truth), np.bool_)
     for i, (line, place, _) in enumerate(positions):
         here = np.flatnonzero(truth[:, 0] == line)
         if len(here):
             off = place - truth[here, 1]
             best = int(np.argmin(np.abs(off)))
             error[i] = off[best]
-            reached[here[best]] |= abs(error[i]) < near
-    right = np.abs(error) < near
+            reached[here[best]] |= abs(error[i]) < nearest(taken)
+    return error, reached
+
+
+def score(taken: Photograph, told: dict, positions: np.ndarray) -> Score:
+    """Positions (n, 3) against the truth."""
+    colour = told.get("colour")
+    if told["axis"] != taken.axis or not len(positions):
+        return Score(0.0, 1.0 if len(positions) else 0.0, math.nan, math.nan, told["axis"], colour)
+    error, reached = off_by(taken, positions)
+    right = np.abs(error) < nearest(taken)
     ratio = error[right] / positions[right, 2]
     ratio = ratio[np.isfinite(ratio)]
     within = float(np.mean(np.abs(ratio) < 2.0)) if len(ratio) else math.nan

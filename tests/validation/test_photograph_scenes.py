@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 
 import numpy as np
 import pytest
 
-from tests.validation.photograph_scenes import TROUBLES, Photograph, judged, score
+from render.frame import Frame, LaserCurve
+from tests.validation.photograph_draws import place_of
+from tests.validation.photograph_scenes import TROUBLES, Photograph, Place, _moved, judged, score
 
 WHOLE, FALSE = 0.98, 0.001
 LOW, HIGH = 0.92, 0.97
@@ -32,6 +35,18 @@ def test_the_score_tells_right_positions_from_false_ones_and_missing_ones() -> N
     assert score(taken, told, wrong).false == pytest.approx(0.1)
     assert score(taken, told, exact[:60]).found == pytest.approx(0.6)
     assert score(taken, {"axis": "columns"}, exact).found == 0.0
+
+
+def test_a_moved_line_is_where_its_truth_is() -> None:
+    centre, rows, x = 40.3 + 0.02 * np.arange(64), np.arange(64), np.arange(96)
+    light = np.exp(-0.5 * ((x - centre[:, None]) / 2.0) ** 2).astype(np.float32)
+    others = dict.fromkeys(field.name for field in fields(LaserCurve))
+    curve = LaserCurve(**{**others, "index": rows, "position": centre})
+    moved = _moved(Frame(0, (light,), ambient=None, curves=(curve,), truth=None), Place(3.25, -0.1))
+    middle = (moved.laser(0) * x).sum(axis=1) / moved.laser(0).sum(axis=1)
+    assert np.abs(middle - moved.curves[0].position).max() < 1e-4
+    assert np.abs(moved.curves[0].position - centre - 3.25 + 0.1 * (rows - 32.0)).max() < 1e-12
+    assert all(abs(place_of(seed).shift) <= 4.0 for seed in range(9)) and place_of(2).slope == 0.0
 
 
 @pytest.mark.validation

@@ -9,8 +9,9 @@ where its line can be: what is found elsewhere is false. Scatter is that about a
 
 Sigma is laid to the residuals of what the defaults give, and this is asserted. Printed beside it is the same of
 positions that are not smoothed along the line: a smoothed line errs alike over many rows, a parabola takes them out,
-and of a sigma that is right 0.7 are left after smoothing over 4 rows, and 0.3 over 13. Printed beside the false rows is
-how many of them are on the line itself, where it steps to another surface: a straight line across a step is on neither.
+and of a sigma that is right 0.85 are left after smoothing over 2.5 rows, 0.7 over 4, and 0.3 over 13. Printed beside
+the false rows is how many of them are on the line itself, where it steps to another surface: a straight line across a
+step is on neither.
 
     BLAZER_PHOTOGRAPHS=/tmp/sets python -m pytest -m validation -s tests/validation/test_photographs.py
 """

@@ -12,7 +12,12 @@ between two breaks (fixed point of Harville, J. Am. Statist. Assoc. 72, 320, 197
     h = (sigma^2 length / q)^(1/4),   at which sigma^2 falls to 3 sqrt(2) / 16 sigma^2 length / h
 
 (Silverman, Ann. Statist. 12, 898, 1984) where the curve is as smooth as can be; a third more is what a curve that is no
-smoother than the model asks of it may be off.
+smoother than the model asks of it may be off. Where h is short beside `length`, the same neighbours are averaged that
+err alike, and sigma^2 falls by less: of noise whose correlation falls geometrically, whose spectrum is
+
+    sigma^2 length / (1 + (length^2 - 1) sin^2(w / 2)),
+
+by G(b) times what white noise of that strength leaves, b = (length^2 - 1)^(1/2) / 2 h, in closed form.
 """
 
 from __future__ import annotations
@@ -143,17 +148,34 @@ class Curve:
         known = max(float((self.told / self.q)[self.bent].sum()), 0.0)
         share = (known * found / max(float(expected), 1e-12) + DOUBT) / (known + DOUBT)
         alone = np.minimum(whole * self.weight, 1.0)  # 1: told by nothing but its own position
-        return np.minimum(whole * (1.0 - (1.0 - np.clip(share, SMOOTHEST, 1.0)) * (1.0 - alone)), own)
+        noise = whole * (1.0 - (1.0 - np.clip(share, SMOOTHEST, 1.0)) * (1.0 - alone))
+        return np.minimum(noise * averaged_alike(self.stretch.length, alone), own)
 
 
-def curve_through(stretch: Stretch, shocks: Sequence[Shock] = (), start: Float | None = None) -> Curve:
-    """The curve with the likeliest q of each piece between breaks; start (n,): q to begin with."""
+def averaged_alike(length: Float, alone: Float) -> Float:
+    """Of noise of which `length` (n,) neighbours err alike, correlations falling geometrically, what a spline leaves of
+    its variance over what it leaves of white noise of variance sigma^2 length; alone (n,): a position's own weight in
+    the curve, 1 / (2 sqrt(2) h) of smoothing length h.
+
+    Integral over w of 1 / ((1 + w^4)^2 (1 + b^2 w^2)), over that of b = 0, by partial fractions.
+    """
+    b = np.sqrt(2.0 * np.maximum(length**2 - 1.0, 0.0)) * alone
+    square, fourth = b**2, b**4
+    far = fourth / (1.0 + fourth) * 4.0 / 3.0 * (np.sqrt(2.0) * b**3 + 1.0 - square)
+    return np.asarray((far + 1.0 - square / 3.0) / (1.0 + fourth))
+
+
+def curve_through(
+    stretch: Stretch, shocks: Sequence[Shock] = (), start: Float | None = None, longest: float = LONGEST
+) -> Curve:
+    """The curve with the likeliest q of each piece between breaks, of smoothing lengths up to `longest` scan lines;
+    start (n,): q to begin with."""
     used, bent = _marked(stretch.there, shocks)
     white = stretch.white
     piece = np.cumsum(bent & ~np.concatenate([[False], bent[:-1]]))  # what is free goes with the one before
     rows = np.maximum(np.bincount(piece), 1)
     typical = np.exp(np.bincount(piece, np.log(white)) / rows)
-    longest = np.clip(rows / PIECE, SHORTEST, LONGEST)
+    most = np.clip(rows / PIECE, SHORTEST, longest)
     q = white / FIRST**4 if start is None else start
     for _ in range(STEPS):
         curve = _curve(stretch, used, bent, q)
@@ -161,7 +183,7 @@ def curve_through(stretch: Stretch, shocks: Sequence[Shock] = (), start: Float |
         known = np.where(bent, np.maximum(curve.told / q, 0.0), 0.0)
         pooled = squares.sum() / max(float(known.sum()), 1e-12)
         likeliest = (np.bincount(piece, squares) + POOLED * pooled) / (np.bincount(piece, known) + POOLED)
-        before, q = q, np.clip(likeliest, typical / longest**4, typical / SHORTEST**4)[piece]
+        before, q = q, np.clip(likeliest, typical / most**4, typical / SHORTEST**4)[piece]
         if not bent.any() or np.abs(np.log(q / before))[bent].max() < SETTLED:
             break
     return _curve(stretch, used, bent, q)

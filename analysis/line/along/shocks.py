@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import chdtri
 
-from analysis.line.along.curve import Curve, Kind, Shock, Stretch, curve_through, with_shocks
+from analysis.line.along.curve import LONGEST, Curve, Kind, Shock, Stretch, curve_through, with_shocks
 from analysis.line.along.five_diagonals import of_second_differences
 from render.base.arrays import Float
 
@@ -30,19 +30,20 @@ ROUNDING = 1e-3
 """Share of a variance below which rounding has it."""
 
 
-def curve_with_shocks(stretch: Stretch) -> tuple[Curve, list[Shock]]:
-    """The curve through a stretch, and the steps, corners and strays that are not smoothed."""
+def curve_with_shocks(stretch: Stretch, longest: float = LONGEST) -> tuple[Curve, list[Shock]]:
+    """The curve through a stretch, smoothed over `longest` scan lines at most, and the steps, corners and strays that
+    are not smoothed."""
     shocks: list[Shock] = []
-    curve = curve_through(stretch)
+    curve = curve_through(stretch, longest=longest)
     for _ in range(ROUNDS):
         more = _found(curve)
         if not more:
             break
         shocks += more
-        curve = curve_through(stretch, shocks, curve.q)
+        curve = curve_through(stretch, shocks, curve.q, longest)
     if shocks:
         shocks = _placed_anew(curve, shocks)
-        curve = curve_through(stretch, shocks, curve.q)
+        curve = curve_through(stretch, shocks, curve.q, longest)
     return curve, shocks
 
 

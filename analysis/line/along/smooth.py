@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.line.along.curve import Kind, Stretch
+from analysis.line.along.curve import LONGEST, Kind, Stretch
 from analysis.line.along.shocks import curve_with_shocks
 from analysis.line.result import SYSTEMATIC, Line
 from render.base.arrays import Float
@@ -42,14 +42,15 @@ class Smoothed:
     """How many strays, corners and steps were kept, by `Kind`."""
 
 
-def smooth_along(line: Line) -> Line:
-    """A line (n, k) -> the same with the positions of each rank estimated along it; `note` tells what was done."""
+def smooth_along(line: Line, longest: float = LONGEST) -> Line:
+    """A line (n, k) -> the same with the positions of each rank estimated along it, over smoothing lengths of up to
+    `longest` scan lines; `note` tells what was done."""
     length = np.ones_like(line.u) if line.length_apart is None else np.nan_to_num(line.length_apart, nan=1.0)
     shared = np.zeros_like(line.u) if line.shared_u is None else np.nan_to_num(line.shared_u)
     apart = np.sqrt(np.maximum(line.variance_apart, (APART * line.sigma_u) ** 2))
     there = line.valid & ~np.isin(line.flag, SYSTEMATIC) & ~(line.sigma_u > SURE * line.width)
     ranks = [
-        smoothed(np.where(there[:, k], line.u[:, k], np.nan), apart[:, k], length[:, k], shared[:, k])
+        smoothed(np.where(there[:, k], line.u[:, k], np.nan), apart[:, k], length[:, k], shared[:, k], longest)
         for k in range(line.u.shape[1])
     ]
     done = np.isfinite(np.stack([one.reach for one in ranks], axis=1))
@@ -73,19 +74,19 @@ def smooth_along(line: Line) -> Line:
     )
 
 
-def smoothed(u: Float, sigma: Float, length: Float, shared: Float) -> Smoothed:
+def smoothed(u: Float, sigma: Float, length: Float, shared: Float, longest: float = LONGEST) -> Smoothed:
     """Positions u (n,) px, NaN where there is none, with their sigmas (n,) px, how many scan lines err alike (n,), and
-    an error in common (n,) px.
+    an error in common (n,) px; over smoothing lengths of up to `longest` scan lines.
     """
     rows = np.flatnonzero(np.isfinite(u) & np.isfinite(sigma) & (sigma > 0.0))
     out = Smoothed(u.copy(), sigma.copy(), length.copy(), shared.copy(), np.full(len(u), np.nan), (0,) * len(Kind))
     for part in np.split(rows, np.flatnonzero(np.diff(rows) > GAP) + 1):
         if len(part) >= FEWEST:
-            out = _stretch_smoothed(out, part)
+            out = _stretch_smoothed(out, part, longest)
     return out
 
 
-def _stretch_smoothed(line: Smoothed, rows: NDArray[np.intp]) -> Smoothed:
+def _stretch_smoothed(line: Smoothed, rows: NDArray[np.intp], longest: float) -> Smoothed:
     """With the positions on `rows`, without wide gaps, smoothed."""
     whole = np.arange(rows[0], rows[-1] + 1)
 
@@ -96,7 +97,7 @@ def _stretch_smoothed(line: Smoothed, rows: NDArray[np.intp]) -> Smoothed:
     level = np.polynomial.Polynomial.fit(rows - middle, line.u[rows], 1)(whole - middle)
     sigma = np.maximum(filled(line.sigma), FINEST * np.median(line.sigma[rows]))
     stretch = Stretch(filled(line.u) - level, sigma, filled(line.length), np.isin(whole, rows))
-    curve, shocks = curve_with_shocks(stretch)
+    curve, shocks = curve_with_shocks(stretch, longest)
     kept = np.flatnonzero(curve.used)
     mean = curve.smoothed(np.stack([filled(line.shared), stretch.white], axis=1))[kept]
     variance = curve.variance()[kept]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from studio.photographs.bands import course
 from studio.photographs.evidence import AXES, DOUBTFUL, Chain, find_evidence, shrink
 from studio.photographs.evidence_words import CONTROLS, OPTIONS, told_of, warnings_of
 from studio.photographs.image_files import has_coarse_colour
+from studio.photographs.photograph_set import NEARBY
 from tests.studio.photographs.colour_photographs import HEIGHT, Scene, photograph, write
 
 SCENES: dict[str, tuple[Scene, int | None]] = {
@@ -138,6 +140,20 @@ def test_a_white_core_is_not_measured_in_the_difference_which_is_hollow(tmp_path
     hollow, _ = positions(tmp_path / "hollow" / "a_line.csv")
     rms = [np.sqrt(np.nanmean((u - scene.centre) ** 2)) for u in (chosen, hollow)]
     assert rms[0] < 0.9 * rms[1] or np.isfinite(hollow).mean() < 0.9
+
+
+def test_nobody_s_wish_is_smoothed_over_few_scan_lines_and_a_wish_as_far_as_the_line_tells(tmp_path: Path) -> None:
+    scene = Scene(peak=120.0, room=20.0, bend=0.0)
+    write(tmp_path / "a.png", photograph(scene, seed=5))
+    rms, reach = {}, {}
+    for name, options in {"alone": ["--no-smooth-along"], "default": [], "far": ["--smooth-along"]}.items():
+        told = answer(tmp_path / "a.png", *options, "--out", tmp_path / name)["images"][0]
+        u, _ = positions(tmp_path / name / "a_line.csv")
+        rms[name] = np.sqrt(np.nanmean((u - scene.centre) ** 2))
+        found = re.search(r"over ([0-9.]+) scan lines", told["note"])
+        reach[name] = float(found.group(1)) if found else 0.0
+    assert reach["alone"] == 0.0 and 1.0 < reach["default"] <= NEARBY < reach["far"]
+    assert rms["far"] < rms["default"] < rms["alone"]
 
 
 def test_the_colours_of_a_jpeg_never_measure_alone(tmp_path: Path) -> None:

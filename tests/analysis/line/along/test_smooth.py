@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
 
-from analysis.line.along.curve import Kind, Shock, Stretch, curve_through
+from analysis.line.along.curve import Kind, Shock, Stretch, averaged_alike, curve_through
 from analysis.line.along.five_diagonals import of_second_differences
 from analysis.line.along.smooth import smooth_along, smoothed
 from analysis.line.extract import extract
@@ -76,6 +77,39 @@ def test_the_error_left_is_that_of_the_spline_s_equivalent_kernel(kind: str) -> 
     # some 24 * 1848 / (4 h) independent values: four standard errors, and a tenth for what bends
     independent = 24 * 1848 / (4.0 * np.median(found.reach) * LENGTHS[kind])
     assert np.mean(squares) / np.mean(predicted) == pytest.approx(1.0, abs=0.1 + 4.0 * math.sqrt(2.0 / independent))
+
+
+def geometric(length: float, rng: np.random.Generator) -> np.ndarray:
+    """(n,) of variance 1, correlations falling geometrically, so that `length` neighbours err alike."""
+    ratio = (length - 1.0) / (length + 1.0)
+    white = rng.normal(size=ROWS + 200) * math.sqrt(1.0 - ratio**2)
+    return lfilter([1.0], [1.0, -ratio], white)[200:]
+
+
+@pytest.mark.parametrize("longest", [1.0, 2.5])
+@pytest.mark.parametrize("length", [1.0, 3.0, 9.0])
+def test_a_short_smoothing_averages_neighbours_that_err_alike_by_less(longest: float, length: float) -> None:
+    ratios, told = [], []
+    for seed in range(12):
+        before = SIGMA * geometric(length, np.random.default_rng(300 + seed))
+        full = np.full(ROWS, length)
+        found = smoothed(SURFACES["flat"] + before, np.full(ROWS, SIGMA), full, np.zeros(ROWS), longest)
+        assert np.nanmax(found.reach) <= longest * 1.001
+        ratios.append(np.mean(((found.u - SURFACES["flat"]) / found.sigma) ** 2))
+        told.append(np.mean(found.sigma**2 * found.length) / (SIGMA**2 * length))
+    # some 12 * 2048 / max(length, 9) independent errors: four standard errors of their variance, and a tenth for the
+    # closed form, which takes scan lines as close
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.1 + 4.0 * math.sqrt(2.0 * max(length, 9.0) / (12 * ROWS)))
+    assert np.mean(told) == pytest.approx(1.0, abs=0.05)
+
+
+def test_what_errs_alike_is_averaged_as_the_spectrum_says() -> None:
+    """The integral in closed form against its sum."""
+    w = (np.arange(400_000) + 0.5) * 1e-3
+    for b in (0.1, 0.7, 3.0, 20.0):
+        alone = np.array([b / math.sqrt(2.0 * 8.0)])
+        whole = np.sum(1.0 / ((1.0 + w**4) ** 2 * (1.0 + (b * w) ** 2))) / np.sum(1.0 / (1.0 + w**4) ** 2)
+        assert averaged_alike(np.array([3.0]), alone) == pytest.approx(whole, rel=1e-4)
 
 
 @pytest.mark.parametrize("kind", LENGTHS)
