@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from render.base.arrays import Bool, Float, Float32, Int, Long
+from render.base.arrays import Bool, Float, Long
 from render.base.errors import Cancelled
 from render.base.pose import invert
 from render.base.threads import Cancel
@@ -30,7 +30,7 @@ from render.laser_indirect.connections import (
     init_light_mis,
     mark_reachable,
 )
-from render.laser_indirect.guiding import NO_KEYS, AlikePixels, DrawnPaths, Guide, any_specular, draw_camera_paths
+from render.laser_indirect.guiding import any_specular
 from render.laser_indirect.path_vertex import (
     ALL_KINDS,
     CAUSTIC,
@@ -48,6 +48,7 @@ from render.laser_indirect.photon_merging import RADIUS_EXPONENT, PhotonMap, mer
 from render.laser_indirect.pixel_rays import pixel_rays
 from render.laser_indirect.random_walk import random_walk_step
 from render.laser_indirect.ris import LightVertices, connect_by_ris
+from render.laser_indirect.sampling import DrawnPaths, Sampling
 from render.laser_indirect.specular_chains import ChainIndex, lit_chains, mark_listed, seen_chains
 from render.material.material import reflectance_weights
 from render.material.medium import MOST_STEPS
@@ -70,20 +71,6 @@ CAMERA_SEED = 0x5DEECE66D
 NOWHERE: Bool = np.zeros(0, np.bool_)
 KINDS = 5
 """Sums of a pass: of each combination of the bits CAUSTIC and SUBSURFACE_LIGHT, and of SPECULAR_CHAIN by itself."""
-
-
-@dataclass(frozen=True)
-class Sampling:
-    """How often a pass tries what; decided by earlier passes only, so that each pass is unbiased."""
-
-    light_paths: int
-    fan: FanDistribution
-    camera_paths: Float32
-    """(pixels,) expected."""
-    active: Int
-    """The pixels that may have a camera path, in order."""
-    guide: Guide
-    alike: AlikePixels = NO_KEYS
 
 
 @dataclass(frozen=True)
@@ -159,7 +146,7 @@ class BdptPass:
         there, roughly, for the camera paths of later passes. None: it is not.
         """
         seed = wrapped(self.seed * 1_000_003 + number)
-        drawn = draw_camera_paths(sampling.camera_paths, sampling.active, sampling.alike, seed ^ CAMERA_SEED)
+        drawn = sampling.drawn(seed ^ CAMERA_SEED)
         keep = len(drawn.pixels) > 0 or specular_pixels is not None
         found: list[Vertices] = []
         for first in range(0, sampling.light_paths, CHUNK_PATHS):

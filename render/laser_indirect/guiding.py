@@ -20,7 +20,6 @@ from render.base.threads import Cancel, map_chunks
 from render.camera.camera import Camera
 from render.laser_indirect.specular_edges import find_edges
 from render.material.bsdf import is_specular_row
-from render.sampling.random import uniform
 from render.world.triangles import Surface
 from render.world.world import World
 
@@ -63,32 +62,6 @@ class Guide(NamedTuple):
     """(tiles down, tiles across) row of `cumulative`; -1: uniform."""
     cumulative: Float
     """(n, BINS + 1) distribution over equal parts of the list of light vertices, from 0 to 1."""
-
-
-class AlikePixels(NamedTuple):
-    """Pixels whose random numbers follow from those of the scan line that is measured on them, all others' from their
-    own."""
-
-    pixel: Int
-    """(m,) in order."""
-    line: Int
-    """(m,) the scan line of each."""
-    lines: int
-    """Scan lines, which keys of other pixels come after; 0: nothing is keyed, each path has numbers of its own."""
-
-
-NO_KEYS = AlikePixels(np.zeros(0, np.int32), np.zeros(0, np.int32), 0)
-
-
-class DrawnPaths(NamedTuple):
-    """The camera paths of a pass."""
-
-    pixels: Int
-    """(n,) that have any."""
-    keys: Int
-    """(n,) the numbers that their random numbers follow from; (0,): from those of the paths."""
-    starts: Int
-    """(n + 1,) the number of each pixel's first path."""
 
 
 def allocate_camera_paths(
@@ -308,41 +281,3 @@ def update_guide_rows(wave_moments: Float, guide_moments: Float, cumulative: Flo
             )
         for i in range(1, BINS + 1):
             cumulative[row, i] /= cumulative[row, BINS]
-
-
-@numba.njit(nogil=True, cache=True)
-def draw_camera_paths(camera_paths: Float32, active: Int, alike: AlikePixels, seed: int) -> DrawnPaths:
-    """The camera paths of a pass, where some pixels may have any.
-
-    Their expected number is rounded up or down at random, so that its mean is kept: together where pixels are alike;
-    all others by one running sum, whose whole numbers they are the steps of (systematic sampling, Madow and Madow
-    1944).
-    """
-    pixels, starts = np.empty(active.shape[0], np.int32), np.empty(active.shape[0] + 1, np.int32)
-    keyed = alike.lines > 0
-    keys = np.empty(active.shape[0] if keyed else 0, np.int32)
-    n = drawn = k = 0
-    starts[0] = 0
-    carried = uniform(seed, 0, 0, 92)
-    for i in range(active.shape[0]):
-        pixel = active[i]
-        while k < alike.pixel.shape[0] and alike.pixel[k] < pixel:
-            k += 1
-        key = pixel + alike.lines
-        if k < alike.pixel.shape[0] and alike.pixel[k] == pixel:
-            key = alike.line[k]
-            count = int(camera_paths[pixel] + uniform(seed, key, 0, 92))
-        else:
-            carried += camera_paths[pixel]
-            if carried < 1.0:
-                continue
-            count = int(carried)
-            carried -= count
-        if count > 0:
-            pixels[n] = pixel
-            if keyed:
-                keys[n] = key
-            drawn += count
-            n += 1
-            starts[n] = drawn
-    return DrawnPaths(pixels[:n], keys[: n if keyed else 0], starts[: n + 1])

@@ -24,12 +24,11 @@ from render.camera.camera import Camera
 from render.importance import Importance
 from render.laser.laser import LineLaser
 from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, PASSES_A_WAVE, Accumulator, sum_looks
-from render.laser_indirect.bdpt_pass import KINDS, BdptPass, Sampling
+from render.laser_indirect.bdpt_pass import KINDS, BdptPass
 from render.laser_indirect.clear_light import NO_LIGHT, ClearLight, clear_light
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.guiding import (
     BINS,
-    NO_KEYS,
     NO_PIXELS,
     active_pixels,
     allocate_camera_paths,
@@ -45,6 +44,7 @@ from render.laser_indirect.line_paths import alike_on_a_line
 from render.laser_indirect.lone_light import spread_lone
 from render.laser_indirect.path_vertex import ALL_KINDS
 from render.laser_indirect.photon_emission import FAN_BINS, FanDistribution, guided_fan, uniform_fan, visible_fan_range
+from render.laser_indirect.sampling import NO_KEYS, Sampling
 from render.run import Run
 from render.world.placed import PlacedLaser
 from render.world.world import World

@@ -20,10 +20,11 @@ from scipy.ndimage import uniform_filter1d
 
 from render.base.arrays import Float, Float32
 from render.laser_indirect.connection_buffer import BLOCK
-from render.laser_indirect.guiding import MOST_CAMERA_PATHS, AlikePixels
+from render.laser_indirect.guiding import MOST_CAMERA_PATHS
 from render.laser_indirect.line_goal import Projection, all_but_unmet
 from render.laser_indirect.line_pools import POOLED, pooled
 from render.laser_indirect.line_sums import block_sums, scale_blocks, weigh_blocks
+from render.laser_indirect.sampling import AlikePixels
 
 LEAST_NEED = 0.02
 """Of the camera paths of a scan line that needs most: what every line gets beside it."""

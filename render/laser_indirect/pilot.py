@@ -12,7 +12,7 @@ from render.base.threads import map_chunks, thread_count
 from render.camera.camera import Camera
 from render.laser.laser import LineLaser
 from render.laser_indirect.accumulator import PASSES_A_WAVE
-from render.laser_indirect.bdpt_pass import BdptPass, Sampling
+from render.laser_indirect.bdpt_pass import BdptPass
 from render.laser_indirect.clear_light import ClearLight, clear_light
 from render.laser_indirect.connection_buffer import PassBuffer, clear_pass
 from render.laser_indirect.guiding import active_pixels, allocate_camera_paths, no_guide, reserve_for_specular
@@ -27,6 +27,7 @@ from render.laser_indirect.integrator import (
 from render.laser_indirect.line_goal import Effect, Projection
 from render.laser_indirect.path_vertex import ALL_KINDS, CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN
 from render.laser_indirect.photon_emission import uniform_fan, visible_fan_range
+from render.laser_indirect.sampling import Sampling
 from render.run import Run
 from render.world.placed import PlacedLaser
 from render.world.world import World

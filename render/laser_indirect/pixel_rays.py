@@ -13,8 +13,8 @@ from render.camera.distortion import tilt_matrix
 from render.camera.lens import chief_ray, lens_direction, lens_position
 from render.camera.view import View
 from render.laser_indirect.connections import CameraSampling, path_lens_point
-from render.laser_indirect.guiding import DrawnPaths
 from render.laser_indirect.path_vertex import Records
+from render.laser_indirect.sampling import DrawnPaths
 from render.sampling.random import uniform
 
 MOST_OF_A_KEY = 1 << 16

@@ -7,7 +7,7 @@ from render.base.deadline import Deadline
 from render.frame import Frame
 from render.laser.laser import Divergence, LineLaser
 from render.laser_direct.integrator import direct_image
-from render.laser_indirect.bdpt_pass import BdptPass, Sampling
+from render.laser_indirect.bdpt_pass import BdptPass
 from render.laser_indirect.guiding import no_guide
 from render.laser_indirect.integrator import empty_buffer, indirect_image
 from render.laser_indirect.light_group import IndirectLight
@@ -19,6 +19,7 @@ from render.laser_indirect.photon_emission import (
     visible_fan_range,
 )
 from render.laser_indirect.pilot import indirect_pilot
+from render.laser_indirect.sampling import Sampling
 from render.light_group import chosen_plan
 from render.material.material import Coated, Conductor, Glass, Lambertian, Subsurface
 from render.mesh.mesh import Mesh
@@ -284,7 +285,7 @@ def test_a_deep_medium_reflects_as_chandrasekhar_says(albedo):
     assert (low, high) == pytest.approx((0.0, 1.0))
     task = BdptPass.of(PlacedLaser(world, camera, beam, T_world_camera, T_world_laser), reach, 3)
     pixels, paths = camera.width * camera.height, 1 << 13
-    nowhere = np.zeros(pixels), np.zeros(0, np.int32)
+    nowhere = np.zeros(pixels, np.float32), np.zeros(0, np.int32)
     sampling = Sampling(paths, uniform_fan(low, high), *nowhere, no_guide(camera))
     found = task.trace_light_paths(7, 0, paths, sampling, empty_buffer(pixels), True)
     caught = sum(traced["throughput"][vertices["material"] == 1].sum() for _, vertices, traced in found)

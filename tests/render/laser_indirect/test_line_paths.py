@@ -7,15 +7,23 @@ import math
 import numpy as np
 import pytest
 
-from render.base.arrays import Float
+from render.base.arrays import Float, Float32, Int
 from render.importance import Importance
 from render.laser_direct.integrator import direct_image
-from render.laser_indirect.bdpt_pass import BdptPass, Sampling
-from render.laser_indirect.guiding import NO_KEYS, AlikePixels, active_pixels, draw_camera_paths, no_guide
+from render.laser_indirect.bdpt_pass import BdptPass
+from render.laser_indirect.guiding import active_pixels, no_guide
 from render.laser_indirect.integrator import empty_buffer
 from render.laser_indirect.line_goal import Projection
 from render.laser_indirect.line_paths import PathDemand, alike_on_a_line
 from render.laser_indirect.photon_emission import uniform_fan, visible_fan_range
+from render.laser_indirect.sampling import (
+    NO_KEYS,
+    AlikePixels,
+    DrawnPaths,
+    Sampling,
+    block_paths,
+    draw_camera_paths,
+)
 from render.material.material import Lambertian
 from render.mesh.mesh import Mesh
 from render.mesh.primitives import primitive_mesh
@@ -76,10 +84,16 @@ def test_peaks_get_paths_where_they_vary_and_some_wherever_there_is_light() -> N
     assert image[15, 5] > 20.0 * image[150, 5]
 
 
+def drawn_of(expected: Float32, alike: AlikePixels, seed: int, active: Int | None = None) -> DrawnPaths:
+    """Camera paths of one pass, on some pixels or on all."""
+    some = np.arange(len(expected), dtype=np.int32) if active is None else active
+    return draw_camera_paths(expected, some, alike, block_paths(expected, some, alike), seed)
+
+
 def test_pixels_of_a_line_have_a_key_in_common_and_others_their_own() -> None:
     projection = Projection.of(importance(), 0)
     active = np.arange(0, HEIGHT * WIDTH, 3, dtype=np.int32)
-    found = draw_camera_paths(np.ones(HEIGHT * WIDTH, np.float32), active, alike_on_a_line(projection), 0)
+    found = drawn_of(np.ones(HEIGHT * WIDTH, np.float32), alike_on_a_line(projection), 0, active)
     keys, on = found.keys, np.isin(active, projection.pixel)
     assert np.array_equal(found.pixels, active)
     assert np.array_equal(keys[on], active[on] // WIDTH)
@@ -151,20 +165,26 @@ def test_shared_random_numbers_move_lines_less_and_leave_every_pixel_unbiased(gr
     assert shared_variance < 0.2 * own_variance
 
 
-def test_camera_paths_are_drawn_as_often_as_expected_and_in_all_to_one_path_of_their_sum() -> None:
+@pytest.mark.parametrize(("pixels", "most"), [(400, 3.0), (4000, 0.01)], ids=["many paths a pixel", "few"])
+def test_camera_paths_are_drawn_as_often_as_expected_and_in_all_to_one_path_of_their_sum(
+    pixels: int, most: float
+) -> None:
     """Systematic sampling: each pixel by its own expectation, the whole as near to its own as whole numbers allow."""
     rng = np.random.default_rng(8)
-    expected = (rng.random(400) ** 4 * 3.0).astype(np.float32)
-    active, repeats = np.arange(400, dtype=np.int32), 4000
-    drawn = np.zeros((repeats, 400))
+    expected = (rng.random(pixels) ** 4 * most).astype(np.float32)
+    repeats = 4000
+    drawn = np.zeros((repeats, pixels), np.int16)
     for seed in range(repeats):
-        found = draw_camera_paths(expected, active, NO_KEYS, seed)
+        found = drawn_of(expected, NO_KEYS, seed)
         drawn[seed, found.pixels] = np.diff(found.starts)
         assert abs(drawn[seed].sum() - expected.sum()) < 1.0
     assert np.all(np.abs(drawn - expected) < 1.0)
-    part = expected % 1.0
+    # as many pixels together as 400 with a few paths, so that their mean is about normal
+    together = np.add.reduceat(drawn, np.arange(0, pixels, pixels // 400), axis=1).mean(axis=0)
+    whole = np.add.reduceat(expected.astype(np.float64), np.arange(0, pixels, pixels // 400))
+    part = whole % 1.0
     deviation = np.sqrt(np.maximum(part * (1.0 - part), 1e-9) / repeats)
-    score = (drawn.mean(axis=0) - expected) / deviation
+    score = (together - whole) / deviation
     # 400 of one seed's numbers are not independent: each lies within what happens to one in 50,000
     assert np.all(np.abs(score) < 4.3)
 
@@ -173,5 +193,5 @@ def test_pixels_of_a_line_are_drawn_alike() -> None:
     expected, active = np.full(64, 0.3, np.float32), np.arange(64, dtype=np.int32)
     alike = AlikePixels(active[8:24], np.ones(16, np.int32), 8)
     for seed in range(50):
-        found = draw_camera_paths(expected, active, alike, seed)
+        found = drawn_of(expected, alike, seed)
         assert np.isin(np.arange(8, 24), found.pixels).sum() in (0, 16)

@@ -15,12 +15,13 @@ import pytest
 from render.camera.camera import Lens
 from render.laser.laser import Divergence
 from render.laser_direct.integrator import direct_image
-from render.laser_indirect.bdpt_pass import BdptPass, Sampling
+from render.laser_indirect.bdpt_pass import BdptPass
 from render.laser_indirect.guiding import no_guide
 from render.laser_indirect.integrator import empty_buffer, indirect_image
 from render.laser_indirect.manifold_walk import landing, passed, set_planes, walk
 from render.laser_indirect.path_vertex import CAUSTIC, SPECULAR_CHAIN
 from render.laser_indirect.photon_emission import uniform_fan, visible_fan_range
+from render.laser_indirect.sampling import Sampling
 from render.laser_indirect.specular_chains import seen_chains
 from render.material.material import Conductor, Glass, Lambertian
 from render.mesh.mesh import Mesh
@@ -119,7 +120,7 @@ def pass_of(parts, **changes):
     task = BdptPass.of(PlacedLaser(world, camera, laser, T_world_camera, T_world_laser), reach, 3)
     pixels = camera.width * camera.height
     active = np.arange(pixels, dtype=np.int32)
-    sampling = Sampling(1 << 13, uniform_fan(low, high), np.ones(pixels), active, no_guide(camera))
+    sampling = Sampling(1 << 13, uniform_fan(low, high), np.ones(pixels, np.float32), active, no_guide(camera))
     return replace(task, **changes), sampling, camera
 
 
