@@ -34,9 +34,8 @@ from render.output.sidecar import (
     laser_layer,
     numbers_from,
     safe_name,
-    sealed,
+    sealed_text,
     sidecar_record,
-    to_text,
 )
 from render.plan import Plan
 from render.scene.scene import Scene
@@ -93,7 +92,7 @@ def write_frame(
         "band": None if band is None else {"share": float(np.mean(band)), "block": BLOCK},
         "exr_sha256": hashlib.sha256(exr).hexdigest(),
     }
-    written.append(_write(folder / f"{name}.json", to_text(sealed(record)).encode()))
+    written.append(_write(folder / f"{name}.json", sealed_text(record).encode()))
     return written
 
 

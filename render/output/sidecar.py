@@ -111,18 +111,38 @@ def sidecar_record(frame: Frame, image: Image | None, scene: Scene, sensor: Sens
 def sealed(record: Record) -> Record:
     """The record with the SHA-256 of its own text, so that a number changed in it later is noticed."""
     entries = {key: value for key, value in record.items() if key != SEAL}
-    return {**entries, SEAL: hashlib.sha256(to_text(entries).encode()).hexdigest()}
+    return {**entries, SEAL: _hash(_lines(entries))}
+
+
+def sealed_text(record: Record) -> str:
+    """The text of the record sealed; half of its making is the numbers of the exact line, which are written once."""
+    lines = _lines({key: value for key, value in record.items() if key != SEAL})
+    return _joined([*lines, *_lines({SEAL: _hash(lines)})])
 
 
 def to_text(record: Record) -> str:
     """JSON text, one line for each entry of the record and for each laser."""
+    return _joined(_lines(record))
+
+
+def _lines(record: Record) -> list[str]:
+    """Each entry of the record as JSON."""
     lines = []
     for key, value in record.items():
-        text = json.dumps(value, ensure_ascii=False, allow_nan=False)
         if key == "lasers" and value:
             text = "[\n" + ",\n".join(json.dumps(one, ensure_ascii=False, allow_nan=False) for one in value) + "\n]"
+        else:
+            text = json.dumps(value, ensure_ascii=False, allow_nan=False)
         lines.append(f"{json.dumps(key)}: {text}")
+    return lines
+
+
+def _joined(lines: list[str]) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _hash(lines: list[str]) -> str:
+    return hashlib.sha256(_joined(lines).encode()).hexdigest()
 
 
 def from_text(text: str, where: str) -> Record:

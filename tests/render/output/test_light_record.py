@@ -18,7 +18,7 @@ from render.base.counts import (
     counts_record,
 )
 from render.output.frame_files import read_frame, write_frame
-from render.output.sidecar import sealed, to_text
+from render.output.sidecar import from_text, sealed, sealed_text, to_text
 from render.plan import GroupQuality, Plan
 from tests.render.output.test_frame_files import frame_of, scene_of
 
@@ -60,3 +60,9 @@ def test_a_frame_of_the_second_version_has_its_sentences_and_its_counts_as_quali
     assert indirect == GroupQuality("indirect", name, 0.2, 0.1, 1e6, "light paths", 1e7)
     assert (ambient.laser, ambient.work, ambient.most, ambient.target) == (None, 3.0, 16.0, 0.01)
     assert [one.reason for one in frame.quality] == ["target", "unfinished", "unfinished"]
+
+
+def test_a_sealed_text_is_that_of_the_sealed_record() -> None:
+    record = {"format": "blazer-frame", "lasers": [{"name": "a", "curve": [1.5, None]}, {"name": "b"}], "step": 3}
+    assert sealed_text(record) == to_text(sealed(record)) == sealed_text(sealed(record))
+    assert from_text(sealed_text({**record, "format_version": 3}), "here")["step"] == 3
