@@ -16,7 +16,7 @@ from render.frame import Frame
 from render.sensor.develop import expected_electrons
 from studio.project.project import Project
 from studio.scan.line_extraction import extract_line, noise_model
-from studio.scan.render_goal import _expected_image, _noise
+from studio.scan.render_goal import _expected_image
 
 
 def rendered_variance(project: Project, frames: Sequence[Frame], draws: int) -> Float:
@@ -31,9 +31,9 @@ def rendered_variance(project: Project, frames: Sequence[Frame], draws: int) -> 
     floor = noise_model(_expected_image(project, electrons[0]), project, 0).floor
     places = []
     for draw in range(draws):
-        noise = _noise(electrons[0], floor, 1.0, (draw,), None)
-        signs = (1.0, noise), (-1.0, noise)
-        images = [[_expected_image(project, light, None, sign) for sign in signs] for light in electrons]
+        noise = np.random.default_rng(draw).standard_normal(electrons[0].shape, np.float32)
+        noise *= np.sqrt(np.maximum(electrons[0] + np.float32(floor), np.float32(1e-2)))
+        images = [[_expected_image(project, light + sign * noise) for sign in (1, -1)] for light in electrons]
         lines = [[extract_line(project, image, 0).u[:, 0] for image in pair] for pair in images]
         places.append(np.mean(lines, axis=1))
     u = np.asarray(places)

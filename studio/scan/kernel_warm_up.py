@@ -327,10 +327,9 @@ def _aim(scene: Scene, cancelled: Cancel) -> None:
     buffers[0].touched[:] = True
     keep_largest(buffers, mean_image(buffers), 1.0, 1.0)
     Effect.of(errors.projection, buffers)
-    paths = np.ones(ones.size)
-    lone_light(paths, ones.ravel(), 1.0, errors.projection)
-    demand = PathDemand.none(errors.projection).learned(errors.projection, errors.spread(buffers), paths, 1.0)
-    demand.aim(paths, errors.projection, camera.width, 1.0)
+    lone_light(np.ones(ones.size), ones.ravel(), 1.0, errors.projection)
+    demand = PathDemand.none(errors.projection).learned(errors.projection, errors.spread(buffers), ones.ravel(), 1.0)
+    demand.aim(ones.flatten(), errors.projection, camera.width, 1.0)
     list(measured_images(PlacedScene(world, scene), everywhere, most=LEAST_SAMPLES, run=run))
     pool(np.ones((1, 3)), np.zeros(1, np.int32), np.zeros((1, 1), np.int32), np.empty((1, 3)))
 
@@ -338,7 +337,7 @@ def _aim(scene: Scene, cancelled: Cancel) -> None:
 def _integrate(scene: Scene, cancelled: Cancel) -> None:
     """Light of the laser over plane glass, which images as small as these leave to random paths."""
     from render.laser_indirect.bdpt_pass import BdptPass
-    from render.laser_indirect.clear_light import Integral
+    from render.laser_indirect.clear_light import Integral, unknown_near
     from render.world.placed import PlacedScene
     from render.world.world import build_world
 
@@ -346,6 +345,7 @@ def _integrate(scene: Scene, cancelled: Cancel) -> None:
         integral = Integral(BdptPass.of(laser, 1.0, 1), Run(cancelled=cancelled), [])
         integral.candidates()
         integral.sampled(np.arange(scene.camera.width), 1)
+    unknown_near(np.zeros(1, np.int64), np.ones((1, 1), np.bool_), np.empty(1, np.int64))
 
 
 def _few(transport: str) -> RenderSettings:

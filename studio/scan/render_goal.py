@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from render.base.arrays import Bool, Float32
 from render.base.threads import map_chunks, rows_of
 from render.frame import Frame, LaserCurve
 from render.importance import CELL, Importance
+from render.sampling.random import wrapped
 from render.scene.settings import DepthGoal
 from render.sensor.develop import Image, expected_electrons
 from render.sensor.response import band_response, joules_per_radiance, laser_response, relative_illumination
@@ -104,9 +106,9 @@ def _as_far_as_known(project: Project, frame: Frame) -> Project:
 def undecided_rows(project: Project, goal: DepthGoal, frame: Frame, laser: int, threads: int | None = None) -> int:
     """Scan lines where noise as small as the goal allows decides between two answers of the line extraction.
 
-    To every pixel goes noise of DECISION goals of its own, and its opposite: what moves with the light moves as far one
-    way as the other, what jumps does not. The sensor's noise is a good deal larger; but of an image without noise, or
-    with the same, another render may find another answer. InputError: as `develop` and `extract`.
+    To every pixel goes noise of DECISION goals of its own, of either sign, and its opposite: what moves with the light
+    moves as far one way as the other, what jumps does not. The sensor's noise is a good deal larger; but of an image
+    without noise, or with the same, another render may find another answer. InputError: as `develop` and `extract`.
     """
     project = _as_far_as_known(project, frame)
     electrons = _electrons(project, frame, laser, threads)
@@ -115,10 +117,10 @@ def undecided_rows(project: Project, goal: DepthGoal, frame: Frame, laser: int, 
     floor = noise_model(image, project, laser).floor
     found = np.zeros(len(line.valid), np.bool_)
     for pair in range(PAIRS):
-        noise = _noise(electrons, floor, DECISION * goal.depth, (project.seed, laser, pair), threads)
+        noise = floor, DECISION * goal.depth, wrapped(project.seed + PAIRS * laser + pair)
         one, other = (
-            extract_line(project, _expected_image(project, electrons, threads, light), laser, threads)
-            for light in ((1.0, noise), (-1.0, noise))
+            extract_line(project, replace(image, pixels=pixels), laser, threads)
+            for pixels in _opposite(image, electrons, noise, threads)
         )
         bent = np.abs(one.u + other.u - 2.0 * line.u) > JUMP * goal.depth * line.sigma_u
         changed = (one.valid != line.valid) | (other.valid != line.valid)
@@ -126,19 +128,21 @@ def undecided_rows(project: Project, goal: DepthGoal, frame: Frame, laser: int, 
     return int(found.sum())
 
 
-def _noise(electrons: Float32, floor: float, share: float, seed: tuple[int, ...], threads: int | None) -> Float32:
-    """(h, w) normal noise, a share of that of electrons (h, w) and the floor, e-^2, beneath them."""
-    noise = np.empty_like(electrons)
+def _opposite(
+    image: Image, electrons: Float32, noise: tuple[float, float, int], threads: int | None
+) -> tuple[Any, Any]:
+    """Pixels (h, w) of the image of mean electrons (h, w) as `opposite_images` makes them."""
+    from render.sensor.opposite_images import opposite_images
+
+    pair: tuple[Any, Any] = np.empty_like(electrons), np.empty_like(electrons)
+    numbers = image.gain, image.black_level, float(image.saturation)
 
     def work(start: int, stop: int) -> None:
-        np.random.default_rng((*seed, start)).standard_normal(out=noise[start:stop], dtype=np.float32)
-        counted = electrons[start:stop] + np.float32(floor)
-        noise[start:stop] *= np.float32(share) * np.sqrt(
-            np.maximum(counted, np.float32(1e-2), out=counted), out=counted
-        )
+        some = slice(start, stop)
+        opposite_images(electrons[some], start, noise, numbers, (pair[0][some], pair[1][some]))
 
-    map_chunks(work, len(noise), ROWS, threads)
-    return noise
+    map_chunks(work, len(electrons), rows_of(electrons.shape[1], ROWS, PIXELS), threads)
+    return pair
 
 
 def _weigh(
@@ -203,10 +207,8 @@ def _electrons(project: Project, frame: Frame, laser: int, threads: int | None) 
     return expected_electrons(frame, project.scene, project.sensor, threads=threads, laser_power=powers)
 
 
-def _expected_image(
-    project: Project, electrons: Float32, threads: int | None = None, more: tuple[float, Float32] | None = None
-) -> Image:
-    """The image of mean electrons (h, w), not quantised; more: how often others (h, w) are added."""
+def _expected_image(project: Project, electrons: Float32, threads: int | None = None) -> Image:
+    """The image of mean electrons (h, w), not quantised."""
     sensor = project.sensor
     top, gain = float(2**sensor.bits - 1), sensor.dn_per_electron
     saturation = min(top, math.floor(gain * sensor.full_well + sensor.black_level + 0.5))
@@ -215,8 +217,6 @@ def _expected_image(
     def work(start: int, stop: int) -> None:
         out = numbers[start:stop]
         np.multiply(electrons[start:stop], np.float32(gain), out=out)
-        if more is not None:
-            out += np.float32(gain * more[0]) * more[1][start:stop]
         out += np.float32(sensor.black_level)
         np.minimum(out, np.float32(saturation), out=out)
 
