@@ -142,8 +142,7 @@ def measure_with_neighbours(
 
     told: that, as found before, so that a line whose own pixels change keeps the neighbours that it had.
     """
-    priors = None if told is None else told.priors
-    estimator = METHODS[settings.method]
+    priors, estimator = None if told is None else told.priors, METHODS[settings.method]
     run, halo = seed_kernel(estimator.measure), estimator.halo
     correlation = smoothing_correlation(settings.smoothing)
     tells_width = estimator.measure is measure_gaussian and settings.width is None
@@ -188,16 +187,17 @@ def measure_with_neighbours(
         chunk = TALL_CHUNK if halo else CHUNK
         map_chunks(lambda start, stop: work(start, stop, options, priors, again), lines.count, chunk, threads)
 
+    alike = lines.noise.alike and lines.seen is None
     run_all(options, priors)
     if passing and told is None and settings.peaks == 1:
-        pass_over(out, flags, passed, settings.threshold, partial(run_all, options, None))
+        pass_over(out, flags, passed, settings.threshold, alike, partial(run_all, options, None))
     together = np.zeros((lines.count, settings.peaks))
     if tells_width and told is None:
         priors, together = _shared_widths(out)
         if priors is not None:
             run_all(options, priors, np.any(priors, axis=(1, 2)))
     farthest = lines.image.shape[1] / np.sqrt(12.0)  # a position that says less than a guess is none
-    length, alike = np.maximum(out[..., CORRELATION_LENGTH], lines.alike), lines.noise.alike and lines.seen is None
+    length = np.maximum(out[..., CORRELATION_LENGTH], lines.alike)
     every = no_gaussian_by_neighbours(out[..., LEAN], out[..., FIT], length, alike) if told is None else told.leaning
     leaning = every & np.isin(flags, (Flag.OK, Flag.UNRESOLVED))
     if leaning.any():
