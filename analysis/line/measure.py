@@ -23,6 +23,7 @@ from analysis.line.methods.half_energy import measure_half_energy
 from analysis.line.methods.leaning import keep_doubtful, keep_sure, no_gaussian_by_neighbours, parts_alone
 from analysis.line.methods.log_fit import CARUANA, GUO, measure_log_parabola
 from analysis.line.methods.misfit import UNLIKELY
+from analysis.line.methods.odd_width import moved_by_odd_width
 from analysis.line.methods.phase import measure_phase
 from analysis.line.methods.seed_loop import (
     COLUMNS,
@@ -255,4 +256,7 @@ def line_of(
     line = Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
     by_width = np.where(together > 0.0, np.nan_to_num(out[..., SHARED]) * together, 0.0)
     common = np.where(np.isin(flags, SYSTEMATIC), np.nan_to_num(out[..., SHARED]), by_width)
+    moved = moved_by_odd_width(width, flags)
+    line = replace(line, sigma_u=np.hypot(sigma_u, moved))
+    common = np.where(moved > 0.0, np.copysign(np.hypot(common, moved), common), common)
     return replace(line, length_apart=length, shared_u=common if common.any() else None)
