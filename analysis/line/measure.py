@@ -256,7 +256,7 @@ def line_of(
     line = Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
     by_width = np.where(together > 0.0, np.nan_to_num(out[..., SHARED]) * together, 0.0)
     common = np.where(np.isin(flags, SYSTEMATIC), np.nan_to_num(out[..., SHARED]), by_width)
-    moved = moved_by_odd_width(width, flags)
+    moved = moved_by_odd_width(u, width, flags)
     line = replace(line, sigma_u=np.hypot(sigma_u, moved))
     common = np.where(moved > 0.0, np.copysign(np.hypot(common, moved), common), common)
     return replace(line, length_apart=length, shared_u=common if common.any() else None)
