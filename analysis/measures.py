@@ -159,14 +159,15 @@ def means(
     sigma: Float,
     length: Float,
     shared: Float,
+    lasting: Mask,
     index: NDArray[np.intp],
     rank: NDArray[np.intp],
     count: int,
 ) -> tuple[Float, Float]:
     """Means of (m,) errors over `count` neighbouring scan lines, and their predicted sigma.
 
-    From sigma, `Line.length_apart` and what lines share by their width, as `Line.shared_u` in the unit of the error
-    (m,).
+    From sigma, `Line.length_apart` and what lines share, as `Line.shared_u` in the unit of the error (m,); lasting:
+    which share it by what is there, as far as that goes, and not by the width of neighbours (m,).
 
     Of the strongest peaks, and of runs without a gap; index, rank: as in `measure`.
     """
@@ -180,7 +181,8 @@ def means(
     begins = begins[lines[begins + count - 1] - lines[begins] == count - 1]
     runs = begins[:, None] + np.arange(count)
     alike = overlap(np.arange(count)[:, None] - np.arange(count))
-    together = np.sum((common[runs] @ alike) * common[runs], axis=1) / count**2
+    last = np.where(lasting[at], common, 0.0)[runs]
+    together = np.sum((common[runs] @ alike) * common[runs] + (last @ (1.0 - alike)) * last, axis=1) / count**2
     return np.asarray(e[runs].mean(axis=1)), np.asarray(np.sqrt(variance[runs].mean(axis=1) + together))
 
 

@@ -23,6 +23,7 @@ from analysis.line.methods.half_energy import measure_half_energy
 from analysis.line.methods.leaning import keep_doubtful, keep_sure, no_gaussian_by_neighbours, parts_alone
 from analysis.line.methods.log_fit import CARUANA, GUO, measure_log_parabola
 from analysis.line.methods.misfit import UNLIKELY
+from analysis.line.methods.odd_width import moved_by_odd_width
 from analysis.line.methods.phase import measure_phase
 from analysis.line.methods.seed_loop import (
     COLUMNS,
@@ -142,8 +143,7 @@ def measure_with_neighbours(
 
     told: that, as found before, so that a line whose own pixels change keeps the neighbours that it had.
     """
-    priors = None if told is None else told.priors
-    estimator = METHODS[settings.method]
+    priors, estimator = None if told is None else told.priors, METHODS[settings.method]
     run, halo = seed_kernel(estimator.measure), estimator.halo
     correlation = smoothing_correlation(settings.smoothing)
     tells_width = estimator.measure is measure_gaussian and settings.width is None
@@ -188,16 +188,17 @@ def measure_with_neighbours(
         chunk = TALL_CHUNK if halo else CHUNK
         map_chunks(lambda start, stop: work(start, stop, options, priors, again), lines.count, chunk, threads)
 
+    alike = lines.noise.alike and lines.seen is None
     run_all(options, priors)
     if passing and told is None and settings.peaks == 1:
-        pass_over(out, flags, passed, settings.threshold, partial(run_all, options, None))
+        pass_over(out, flags, passed, settings.threshold, alike, partial(run_all, options, None))
     together = np.zeros((lines.count, settings.peaks))
     if tells_width and told is None:
         priors, together = _shared_widths(out)
         if priors is not None:
             run_all(options, priors, np.any(priors, axis=(1, 2)))
     farthest = lines.image.shape[1] / np.sqrt(12.0)  # a position that says less than a guess is none
-    length, alike = np.maximum(out[..., CORRELATION_LENGTH], lines.alike), lines.noise.alike and lines.seen is None
+    length = np.maximum(out[..., CORRELATION_LENGTH], lines.alike)
     every = no_gaussian_by_neighbours(out[..., LEAN], out[..., FIT], length, alike) if told is None else told.leaning
     leaning = every & np.isin(flags, (Flag.OK, Flag.UNRESOLVED))
     if leaning.any():
@@ -255,4 +256,7 @@ def line_of(
     line = Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
     by_width = np.where(together > 0.0, np.nan_to_num(out[..., SHARED]) * together, 0.0)
     common = np.where(np.isin(flags, SYSTEMATIC), np.nan_to_num(out[..., SHARED]), by_width)
+    moved = moved_by_odd_width(u, width, flags)
+    line = replace(line, sigma_u=np.hypot(sigma_u, moved))
+    common = np.where(moved > 0.0, np.copysign(np.hypot(common, moved), common), common)
     return replace(line, length_apart=length, shared_u=common if common.any() else None)

@@ -26,27 +26,36 @@ NO_LINE = (Flag.TOO_WIDE, Flag.NOT_CONVERGED, Flag.OUT_OF_WINDOW)
 """What is measured and is none. A line that the border cuts off is one, and what is beside it is not."""
 CLEAR = 2.0
 """Times the detection threshold: at 1.0 bumps of a lit part were lines in 0.5 % of its scan lines, at 2.0 in 0.1 %."""
+ALIKE = math.sqrt(8.0)
+"""Times the same where neighbouring pixels share noise: of a colour that a mosaic sees at every other pixel, the rest
+their means, a sum over many has 8 times the variance that the differences of neighbours tell."""
 LINES = (Flag.OK, Flag.SATURATED, Flag.UNRESOLVED)
 """What the next peak may be."""
 
 
 def pass_over(
-    out: Float, flags: NDArray[np.uint8], passed: Long, threshold: float, measure: Callable[[Bool], None]
+    out: Float,
+    flags: NDArray[np.uint8],
+    passed: Long,
+    threshold: float,
+    alike: bool,
+    measure: Callable[[Bool], None],
 ) -> None:
     """Strongest peaks that were measured, out (n, 1, columns) and flags (n, 1), and how many are passed over (n,): in
     place those that come next, where the strongest is none.
 
     measure: measures scan lines (n, 1) again, where some peaks are passed over. threshold: of the detection.
+    alike: neighbouring pixels share noise.
     """
     refused: Bool = np.isin(flags[:, 0], NO_LINE)
     if not refused.any():
         return
-    before, why = out.copy(), flags.copy()
+    before, why, clear = out.copy(), flags.copy(), CLEAR * threshold * (ALIKE if alike else 1.0)
     sought, found = refused.copy(), np.zeros_like(refused)
     for count in range(1, MOST + 1):
         passed[sought] = count
         measure(sought[:, None])
-        found |= sought & np.isin(flags[:, 0], LINES) & (_response(out[:, 0]) >= CLEAR * threshold)
+        found |= sought & np.isin(flags[:, 0], LINES) & (_response(out[:, 0]) >= clear)
         sought &= ~found & (flags[:, 0] != Flag.NO_PEAK)
         if not sought.any():
             break

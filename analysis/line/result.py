@@ -84,7 +84,8 @@ class Line:
     without one. Neighbouring scan lines may err alike, by speckle or smoothing: the variance of a mean over many, n, is
     sigma_u^2 `correlation_length` / n; 1 where they do not, None where it is not known. It is made of two parts:
     `shared_u`, px, is how far, and to which side, one standard deviation of what neighbours share moves the position,
-    the width of narrow lines and what the model of `SYSTEMATIC` ones does not hold, None where they share nothing;
+    the width of narrow lines, the less the farther apart they are, and what the model of `SYSTEMATIC` ones does not
+    hold, which lasts from one to the next; None where they share nothing;
     `length_apart` is the correlation length of what is left of sigma_u. `note` tells what "auto" picked and why;
     `candidates` are the peaks that one was selected from.
     """
@@ -124,11 +125,14 @@ class Line:
         if self.length_apart is None or self.shared_u is None:
             return self.length_apart
         shared = np.nan_to_num(self.shared_u)
+        lasting = np.isin(self.flag, SYSTEMATIC)
         reach, rows = 2 * NEIGHBOURS, len(shared)
-        padded = np.pad(shared, ((reach, reach), (0, 0)))
+        padded = [np.pad(one, ((reach, reach), (0, 0))) for one in (shared, np.where(lasting, shared, 0.0))]
         total = shared.copy()
         for distance in range(1, reach + 1):  # both sides at once: upside down it is the same to the last bit
-            total += overlap(distance) * (padded[reach - distance :][:rows] + padded[reach + distance :][:rows])
+            every, last = (one[reach - distance :][:rows] + one[reach + distance :][:rows] for one in padded)
+            alike = overlap(distance)
+            total += alike * every + np.where(lasting, (1.0 - alike) * last, 0.0)
         # neighbours that err to the other side may leave less than nothing of a single one
         own = self.variance_apart * self.length_apart
         both = (own + np.maximum(shared * total, 0.0)) / self.sigma_u**2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from analysis.line.result import SYSTEMATIC
 from analysis.measures import means
 from analysis.report.model import ReportInput
 from analysis.report.sample import Rows
@@ -30,13 +31,13 @@ def term_rows(rows: Rows) -> list[tuple[str, list[str]]]:
     and all that a point's error is made of together."""
     error, random, systematic = rows["depth"], rows["sigma_depth"], rows["sigma_systematic"]
     sheet = np.abs(rows["sheet_bias"]) * rows["pixel_depth"]
-    where = rows["index"], rows["rank"]
+    of_lines = rows["alike"], rows["shared"], np.isin(rows["flag"], SYSTEMATIC), rows["index"], rows["rank"]
     told = [("each point: noise", _cells(error, random))]
     for number in MEANS:
         told.append(
             (
                 f"mean of {number} scan lines: noise",
-                _cells(*means(error, random, rows["alike"], rows["shared"], *where, number)),
+                _cells(*means(error, random, *of_lines, number)),
             )
         )
     if np.any(systematic > 0.0):

@@ -117,9 +117,14 @@ def _beside(distance: Float, width: float) -> NDArray[np.bool_]:
     return found
 
 
+def core_reach(width: float) -> int:
+    """px to either side of a line of a sigma, px, that hold its light."""
+    return int(np.ceil(CORE * width))
+
+
 def near(stretch: Stretch, width: float) -> Stretch:
     """The pixels whose noise is looked at: within `CORE` widths of the line, and `BESIDE`."""
-    middle, reach = stretch.values.shape[1] // 2, int(np.ceil(CORE * width)) + BESIDE
+    middle, reach = stretch.values.shape[1] // 2, core_reach(width) + BESIDE
     columns = slice(max(middle - reach, 0), middle + reach + 1)
     return replace(stretch, values=stretch.values[:, columns], distance=stretch.distance[:, columns])
 
@@ -132,7 +137,7 @@ def transfer_of(
     shape, slope: (n, w) model of the line at every pixel, and its derivative. lowest: DN that the sensor cuts off at.
     edges: DN of the laser's light by which pixels are sorted; None: as many in each. None: too few pixels.
     """
-    core = np.abs(np.arange(stretch.values.shape[1]) - stretch.values.shape[1] // 2) <= np.ceil(CORE * width)
+    core = np.abs(np.arange(stretch.values.shape[1]) - stretch.values.shape[1] // 2) <= core_reach(width)
     values = stretch.values
     basis = np.stack([shape, slope, np.ones_like(values)], axis=2)
     # the same pixels of the next scan line: what the profile misses is another at another place

@@ -26,11 +26,13 @@ LEAST = 0.2
 
 @dataclass(frozen=True)
 class Noise:
-    """(3,) gain DN/e-, R DN^2 and c^2; their sigmas; whether the light's scatter was told."""
+    """(3,) gain DN/e-, R DN^2 and c^2; their sigmas; whether the light's scatter was told; (3,) sigmas by what a
+    rehearsal leaves out."""
 
     values: Float
     sigmas: Float
     scattered: bool
+    left_out: Float
 
 
 def transfer(seen: Seen, shape: Float, edges: Float | None = None) -> Transfer | None:
@@ -61,13 +63,17 @@ def counted(noise: Noise) -> bool:
     return bool(noise.values[0] > COUNTED * noise.sigmas[0])
 
 
-def fit_noise(found: Transfer, black: float, scatter: float, own: bool, like: Noise | None = None) -> Noise:
+def fit_noise(
+    found: Transfer, black: float, scatter: float, own: bool, left_out: Float, like: Noise | None = None
+) -> Noise:
     """Noise against light -> its three numbers. scatter: c of the project. own: c is the project's in any case.
 
+    left_out: (k,) DN^2, standard deviation of each variance by what a rehearsal leaves out.
     like: a fit that tells what is told. InputError: the noise does not grow with the light.
     """
     good = np.isfinite(found.variance) & (found.sigma > 0.0)
-    sigma = found.sigma[good]
+    # where a million pixels tell the noise of the ground, the rehearsal does not
+    sigma = np.hypot(found.sigma, left_out)[good]
     columns = basis(found, black)[good] / sigma[:, None]
     value = (found.variance[good] - 1.0 / 12.0) / sigma
 
@@ -76,13 +82,18 @@ def fit_noise(found: Transfer, black: float, scatter: float, own: bool, like: No
         done = least_squares(lambda p: some @ p - value, np.full(len(free), 1e-6), bounds=(0.0, np.inf), x_scale="jac")
         excess = max(2.0 * done.cost / max(len(value) - len(free), 1), 1.0)
         p, spread = np.zeros(3), np.zeros(3)
-        p[free], spread[free] = done.x, np.sqrt(np.diag(np.linalg.pinv(some.T @ some)) * excess)
+        p[free], spread[free] = done.x, np.sqrt(excess) * propagated(free, found.sigma)
         return p, spread
 
-    p, spread = solved([0, 1, 2], value) if not own else (np.zeros(3), np.zeros(3))
+    def propagated(free: list[int], each: Float) -> Float:
+        return np.asarray(np.sqrt(np.sum((np.linalg.pinv(columns[:, free]) * (each[good] / sigma)) ** 2, axis=1)))
+
+    free = [0, 1, 2]
+    p, spread = solved(free, value) if not own else (np.zeros(3), np.zeros(3))
     scattered = not own and (p[2] >= SURE * spread[2] if like is None else like.scattered)
     if not scattered:
-        p, spread = solved([0, 1], value - scatter**2 * columns[:, 2])
+        free = [0, 1]
+        p, spread = solved(free, value - scatter**2 * columns[:, 2])
         p[2] = scatter**2
     if like is None and p[0] <= SURE * spread[0] and not own:
         raise InputError(
@@ -90,13 +101,16 @@ def fit_noise(found: Transfer, black: float, scatter: float, own: bool, like: No
             found=f"gain {p[0]:.3g} +- {spread[0]:.3g} DN/e-",
             cure="give raw images without compression, denoising or a tone curve",
         )
-    return Noise(p, spread, scattered)
+    unsure = np.zeros(3)
+    unsure[free] = propagated(free, left_out)
+    return Noise(p, spread, scattered, unsure)
 
 
 def less(found: Transfer, rehearsed: Float, passed: Float, usual: Float) -> Transfer:
     """The noise as the closed form has it, by what a rehearsal of (k,) DN^2 lacks of it.
 
-    passed: (k,) share of the sensor's noise that comes through; usual: (k,) of the rehearsal by the closed form.
+    passed: (k,) share of the sensor's noise that comes through; usual: (k,) of the rehearsal, at its own light, by the
+    closed form.
     """
     variance = usual + (found.variance - rehearsed) / passed
     # a step that takes all of the noise would leave nothing to rehearse

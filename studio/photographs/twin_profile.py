@@ -43,6 +43,8 @@ class Part:
     known: float
     """px^2: defocus, and scatter of the positions."""
     tilt: float
+    place: int
+    """Among the stretches."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,9 @@ class Shape:
     """(4,) as fitted, before the blur was put back to the project's."""
     line: float
     """Sigma of the line's variance, px^2, sheet and blur together."""
+    unlike: float
+    """px^2: by how much that variance is another one at most if all of it is the sheet's, or the blur's; 0 where they
+    are told apart."""
 
 
 def parts_of(seen: Seen) -> list[Part]:
@@ -68,7 +73,7 @@ def parts_of(seen: Seen) -> list[Part]:
     for k in np.unique(place):
         some = np.flatnonzero(place == k)
         means = (float(np.mean(one[some])) for one in (whole.sheet**2, added, whole.tilt))
-        parts.append(Part(mean_profile(whole.stretch, some, seen.width), *means))
+        parts.append(Part(mean_profile(whole.stretch, some, seen.width), *means, int(k)))
     if any(len(one.profile.value) < SHORTEST or not one.profile.value.max() > 0.0 for one in parts):
         raise InputError(
             "the line's profile cannot be told",
@@ -132,7 +137,7 @@ def fit_shape(parts: list[Part], start: Float, halo: bool, like: Shape | None = 
     low[3] = low[3] if halo else 1e-6
     start = np.clip(start, low + 1e-9, high)
 
-    def solved(free: list[int]) -> tuple[Float, Float, Float]:
+    def solved(free: list[int], start: Float) -> tuple[Float, Float, Float]:
         def some(q: Float) -> Float:
             p = start.copy()
             p[free] = q
@@ -148,22 +153,28 @@ def fit_shape(parts: list[Part], start: Float, halo: bool, like: Shape | None = 
     haloed = halo if like is None else like.haloed
     if not haloed and halo:
         start[2] = 0.0
-    p, sigma, covariance = solved([0, 1, 2, 3] if haloed else [0, 1])
+    p, sigma, covariance = solved([0, 1, 2, 3] if haloed else [0, 1], start)
     if like is None and haloed and not (p[2] > SURE * sigma[2] and sigma[3] < 0.5 * p[3] and p[3] > 1.05 * low[3]):
         haloed, start[2] = False, 0.0
-        p, sigma, covariance = solved([0, 1])
+        p, sigma, covariance = solved([0, 1], start)
     sheets = np.array([one.sheet for one in parts])
     varied = float(np.ptp(sheets)) > VARIED * float(np.mean(sheets))
     apart = varied and sigma[0] < 2.0 * TOLD * p[0] and sigma[1] < 2.0 * TOLD * max(p[1], 0.25)
     apart = bool(apart) if like is None else like.apart
     sheet, best = float(np.mean(sheets)), p.copy()
     spread = float(np.sqrt(max(np.array([sheet, 1.0]) @ covariance[:2, :2] @ np.array([sheet, 1.0]), 0.0)))
+    unlike = 0.0
     if not apart:
+        for free, other in ((0, 1), (1, 0)):
+            alone = p.copy()
+            alone[free], alone[other] = alone[free] + alone[other] * (sheet if free else 1.0 / sheet), low[other]
+            q = solved([free], alone)[0]
+            unlike = max(unlike, abs(float((q - best)[:2] @ [sheet, 1.0])))
         # the line's variance is told by its shape however it is shared; the sheet takes what the blur leaves
         p[0], p[1] = (p[0] * sheet + p[1] - start[1]) / sheet, start[1]
         sigma[0], sigma[1] = spread / sheet, 0.0
     _check(p, sigma, float(np.sqrt(start[1])))
-    return Shape(p, sigma, apart, haloed, best, spread)
+    return Shape(p, sigma, apart, haloed, best, spread, unlike)
 
 
 def _check(p: Float, sigma: Float, blur: float) -> None:
@@ -192,16 +203,20 @@ def _variance(parts: list[Part]) -> float:
     return float(np.median(widths)) ** 2
 
 
-def departures(values: Float, parts: list[Part]) -> list[tuple[Float, Float]]:
-    """Of each rehearsed profile: distances (m,) px, and by how much it is above what is expected of (4,) values."""
-    return [(one.profile.distance, one.profile.value - expected(values, one, one.profile.distance)) for one in parts]
+def departures(values: Float, parts: list[Part]) -> dict[int, tuple[Float, Float]]:
+    """By place, of each rehearsed profile: distances (m,) px, and by how much it is above what is expected of (4,)
+    values."""
+    profiles = [(one, one.profile) for one in parts]
+    return {one.place: (of.distance, of.value - expected(values, one, of.distance)) for one, of in profiles}
 
 
-def less(parts: list[Part], departed: list[tuple[Float, Float]]) -> list[Part]:
-    """The parts without what their rehearsal departs by."""
+def less(parts: list[Part], departed: dict[int, tuple[Float, Float]]) -> list[Part]:
+    """The parts without what their rehearsal departs by; those that it shows nothing of are left out."""
     found = []
-    for part, (distance, value) in zip(parts, departed, strict=True):
-        profile = part.profile
+    for part in parts:
+        if part.place not in departed:
+            continue
+        (distance, value), profile = departed[part.place], part.profile
         level = profile.value - np.interp(profile.distance, distance, value)
         found.append(replace(part, profile=profile._replace(value=level)))
     return found

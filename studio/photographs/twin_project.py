@@ -24,9 +24,13 @@ from studio.photographs.photographs import Measured, check_size, extract_photogr
 from studio.photographs.rehearsal import Stage, ground_of, rehearsed
 from studio.photographs.twin import Told, Twin, by_rehearsal
 from studio.photographs.twin_light import FULL, light_of, numbers_of
-from studio.photographs.twin_seen import Seen, look
+from studio.photographs.twin_seen import Seen, light_above, look
 from studio.preview.inspection import inspect
+from studio.preview.laser_light import laser_electrons
 from studio.project.project import Project
+
+LIT = 0.01
+"""Of the usual light of the project's line, below which a scan line has none to be compared."""
 
 
 class Made(NamedTuple):
@@ -67,7 +71,7 @@ def twin_of(project: Project, root: Path, laser: int, paths: Sequence[Path], thr
     axis = seen_as.settings.axis
     by_number = {one.photograph: one for one in seen.pieces}
     ground = [
-        ground_of(one.image, by_number[k], sensor, axis) if k in by_number else np.zeros(1)
+        ground_of(one.image, by_number[k], sensor, axis, seen.width) if k in by_number else np.zeros((0, 2, 1))
         for k, one in enumerate(measured)
     ]
     stage = Stage(laser, paths, seen_as, lossy, ground, threads)
@@ -78,7 +82,7 @@ def twin_of(project: Project, root: Path, laser: int, paths: Sequence[Path], thr
     try:
         with naming(paths[0]):
             twin = by_rehearsal(project, seen, numbers, rehearse)
-        made, power = _with_power(_with_twin(project, laser, twin), root, laser, twin, threads)
+        made, power = _with_power(_with_twin(project, laser, twin), root, laser, twin, seen, threads)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
@@ -179,16 +183,40 @@ def wider(laser: LineLaser, scale: float) -> LineLaser:
     return laser.model_copy(update={"sheet": type(sheet).model_validate({**sheet.model_dump(), **values})})
 
 
-def _with_power(project: Project, root: Path, laser: int, twin: Twin, threads: int | None) -> tuple[Project, Told]:
+def _with_power(
+    project: Project, root: Path, laser: int, twin: Twin, seen: Seen, threads: int | None
+) -> tuple[Project, Told]:
     """The project whose line is as bright as the photographs': power times reflectance is all that they show."""
-    light = inspect(_of_one_colour(project, laser), root, threads).lasers[laser].light_electrons
+    brighter = _brighter(_of_one_colour(project, laser), root, laser, twin, seen, threads)
     lasers = list(project.scene.lasers)
     power = lasers[laser].power
-    if not light or twin.peak.value <= 0.0:
+    if not brighter > 0.0:
         return project, Told(power, 0.0, "the project's laser lights nothing that its camera sees")
-    scaled = power * twin.peak.value / light
+    scaled = power * brighter
     lasers[laser] = LineLaser.model_validate({**lasers[laser].model_dump(), "power": scaled})
     return _with_lasers(project, tuple(lasers)), Told(scaled, scaled * twin.peak.sigma / twin.peak.value)
+
+
+def _brighter(project: Project, root: Path, laser: int, twin: Twin, seen: Seen, threads: int | None) -> float:
+    """How many times as much light the photographs have of the line as the project's own; 0: it has none.
+
+    Of the same scan lines, as some are brighter than others and not all of them are seen; where the line is not the
+    project's, of the brightest pixel in the median.
+    """
+    first = [piece for piece in seen.pieces if piece.photograph == 0 or project.scene.frame_count == 1]
+    if seen.facing or not first:
+        light = inspect(project, root, threads).lasers[laser].light_electrons
+        return twin.peak.value / light if light else 0.0
+    electrons = laser_electrons(project, root, laser, threads)
+    found, own = (
+        np.concatenate([light_above(one) for one in windows])
+        for windows in (
+            [piece.stretch.values for piece in first],
+            [electrons[piece.stretch.row[:, None], piece.columns].astype(np.float64) for piece in first],
+        )
+    )
+    there = own > LIT * float(np.median(own))
+    return float(np.median(found[there] / own[there])) / twin.gain.value if there.any() else 0.0
 
 
 def _of_one_colour(project: Project, laser: int) -> Project:

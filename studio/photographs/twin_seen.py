@@ -48,6 +48,11 @@ class Piece:
     photograph: int = 0
     """Of the set."""
 
+    @property
+    def columns(self) -> NDArray[np.intp]:
+        """(n, w) px of its windows."""
+        return self.stretch.column[:, None] + np.arange(self.stretch.values.shape[1])
+
     def of(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> Piece:
         """Some of its scan lines."""
         return Piece(
@@ -140,6 +145,11 @@ def look(
             cure="expose less, or add photographs",
         )
     return seen
+
+
+def light_above(values: Float) -> Float:
+    """Windows (n, w) DN -> (n,) DN of light above what is at their ends."""
+    return np.asarray((values - np.median(values[:, [0, 1, -2, -1]], axis=1)[:, None]).sum(axis=1))
 
 
 def margin_of(width: float) -> int:

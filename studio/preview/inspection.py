@@ -21,24 +21,17 @@ from render.camera.camera import Camera
 from render.frame import Frame, LaserCurve
 from render.output.light_record import plan_record
 from render.plan import Plan
-from render.run import Run
-from render.scene.lights import Environment
-from render.scene.motion import NoMotion
 from render.sensor.develop import expected_electrons
 from render.sensor.response import laser_response
-from render.world.material_checks import check_materials, scene_warnings
-from render.world.placement_checks import check_placement
+from render.world.material_checks import scene_warnings
 from render.world.world import build_world
 from studio.preview.estimates import ambient_electrons, line_pixels, line_width_px
 from studio.preview.inside import inside
+from studio.preview.laser_light import light_of, of_lasers
 from studio.preview.preview import Look, Preview
 from studio.preview.saturation import saturated_rows
 from studio.project.project import Project
 
-PROBE_ERROR = 0.05
-"""Relative error of the light that is rendered to look at; ample for figures that are called about."""
-PROBE_REFLECTED = 0.3
-"""The same of reflected light."""
 WORKING_DISTANCES = np.geomspace(0.01, 100.0, 4001)
 WIDE_PX = 6.0
 """Sigma of a line up to which it measures well; from NARROW_PX on."""
@@ -115,17 +108,10 @@ class Inspection:
 def inspect(project: Project, root: Path, threads: int | None = None) -> Inspection:
     """Load the meshes below `root` and look. InputError: what rendering would refuse as well."""
     from render.products import expected_plan  # these take a while: a window opens without them
-    from render.render import render_world
 
     scene = project.scene
     world = build_world(scene, root, 0)
-    check_placement(world, scene, 0)
-    check_materials(world, scene)
-    dark = scene.model_copy(update={"lights": (), "environment": Environment(), "motion": NoMotion()})
-    probe = {"laser_error": PROBE_ERROR, "indirect_error": PROBE_REFLECTED, "light_paths": 1 << 20}
-    depth = project.sensor.needs_depth(scene.camera.lens.model)
-    settings = project.render.model_copy(update={**probe, "truth_images": depth})
-    frame = render_world(world, dark, settings=settings, axis=project.extraction.axis, run=Run(threads=threads))
+    frame = of_lasers(project, world, threads)
     look = Preview(threads).look(project, root)
     views = laser_views(project, frame, beneath=[_ambient_beneath(look, i) for i in range(len(frame.curves))])
     counts = np.bincount(world.object_id, minlength=len(scene.visible_objects))
@@ -201,7 +187,7 @@ def _laser_view(
     plane = scene.laser_plane(i)
     nearest, farthest = working_range(camera, scene.T_camera_laser(i))
     hit = np.unique(curve.index)
-    lines = _light(project, frame, i, power)[hit].astype(np.float64)
+    lines = light_of(project, frame, i, power)[hit].astype(np.float64)
     light, width = _brightness(lines)
     background = np.full((len(hit), 1), project.sensor.dark_current * project.sensor.exposure_time)
     if ambient is not None:
@@ -285,14 +271,6 @@ def _saturated_along(curve: LaserCurve, electrons: Float32 | None, full_well: fl
     lines = electrons if curve.axis == "rows" else electrons.T
     along = np.clip(np.round(curve.position).astype(np.intp), 0, lines.shape[1] - 1)
     return float(np.mean(lines[curve.index, along] > full_well))
-
-
-def _light(project: Project, frame: Frame, i: int, own_power: float) -> Float32:
-    """Electrons of one laser's light, its scan lines along the first axis."""
-    power = [own_power if k == i else 0.0 for k in range(len(frame.curves))]
-    light_alone = project.sensor.model_copy(update={"dark_current": 0.0})
-    electrons = expected_electrons(frame, project.scene, light_alone, laser_power=power)
-    return electrons if frame.curves[i].axis == "rows" else electrons.T
 
 
 def _brightness(lines: Float) -> tuple[Float, Float]:

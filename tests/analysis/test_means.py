@@ -19,13 +19,32 @@ def alike(rows: int, r: float, seed: int = 0) -> np.ndarray:
     return errors
 
 
+def alone(index: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Scan lines of which none has anything in common: which do, where they are, and their ranks."""
+    return np.zeros(len(index), np.bool_), index, np.zeros_like(index)
+
+
+@pytest.mark.parametrize("count", [10, 100])
+def test_what_lasts_is_as_large_in_a_mean_as_in_one(count):
+    """And what a width in common costs is less, the farther apart the lines are."""
+    rows, sigma = 400 * count, np.full(400 * count, 2.0)
+    index = np.arange(rows)
+    given = sigma, np.ones(rows), sigma
+    found, told = means(sigma, *given, np.ones(rows, np.bool_), *alone(index)[1:], count)
+    np.testing.assert_allclose(told, 2.0)
+    np.testing.assert_allclose(found, 2.0)
+    _, narrow = means(sigma, *given, *alone(index), count)
+    lags = np.abs(np.arange(count)[:, None] - np.arange(count))
+    np.testing.assert_allclose(narrow**2, 4.0 * np.maximum(1.0 - lags / 65.0, 0.0).mean())
+
+
 @pytest.mark.parametrize("count", [10, 100])
 @pytest.mark.parametrize("r", [0.0, 0.3, 0.8])
 def test_means_scatter_as_their_correlation_length_says(r, count):
     rows = 400 * count
     index = np.arange(rows)
     length = np.full(rows, (1.0 + r) / (1.0 - r))
-    found, told = means(alike(rows, r), np.ones(rows), length, np.zeros(rows), index, np.zeros_like(index), count)
+    found, told = means(alike(rows, r), np.ones(rows), length, np.zeros(rows), *alone(index), count)
     assert len(found) == 400
     np.testing.assert_allclose(np.mean(found**2), np.mean(told**2), rtol=4 * np.sqrt(2 / 400))
 
@@ -40,7 +59,7 @@ def test_only_runs_without_a_gap_and_their_strongest_peaks_count():
     index = np.array([0, 1, 2, 3, 3, 5, 6, 8, 9, 10, 11])  # 4 and 7 are missing, 3 has two peaks
     rank = np.array([0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0])
     error = np.array([1.0, 2.0, 3.0, 99.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0])
-    found, told = means(error, np.ones(11), np.ones(11), np.zeros(11), index, rank, 4)
+    found, told = means(error, np.ones(11), np.ones(11), np.zeros(11), np.zeros(11, np.bool_), index, rank, 4)
     np.testing.assert_allclose(found, (2.5, 8.5))
     np.testing.assert_allclose(told, 0.5)
 

@@ -56,7 +56,6 @@ ALL_ALIKE = {
         for noise in NOISES
     ),
     *(("partly occluded", signal, 8.0, noise) for signal in MEANS_OF for noise in NOISES),
-    *(("partly occluded", 1000.0, 2.0, noise) for noise in NOISES),
     ("mosaic", 10000.0, 0.6, KNOWN),
 }
 """Cells where means with flagged points err by more than told, as all of these are moved alike."""

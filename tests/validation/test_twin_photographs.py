@@ -24,7 +24,7 @@ from studio.photographs.twin_light import light_of, numbers_of
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.scan.stages import Clock, render_step
-from tests.validation.twin_scenes import SCANNERS, THIN_LINES, Scanner, lit, photographed, rendered, twin
+from tests.validation.twin_scenes import SCANNERS, THIN_LINES, Scanner, lit, photographed, rendered, truths, twin
 
 pytestmark = pytest.mark.validation
 
@@ -151,6 +151,23 @@ def test_the_twins_own_photographs_are_those_of_the_scanner(name: str) -> None:
     assert apart < NOISE
     assert abs(noise) < NOISE
     assert abs(made.alike - scanner.alike) < ALIKE
+
+
+@pytest.mark.parametrize("name", [*SCANNERS, *THIN_LINES])
+def test_what_is_told_is_off_by_no_more_than_its_sigma_allows(name: str) -> None:
+    """Gain, read noise, the laser's power by it, and the line's width, of every scanner."""
+    one = fit(name)
+    sheet = one.told["sheet_px"]["value"] / one.told["scale"]["value"] / one.scanner.wrong_sheet
+    true = {**truths(one.true), "line_px": math.hypot(sheet, one.scanner.blur_px)}
+    told = ["line_px"] if one.told["gain"]["kept"] else ["line_px", "gain", "read_noise", "laser_power_w"]
+    for key in told:
+        found = one.told[key]
+        if not found["kept"]:
+            off = (found["value"] - true[key]) / found["sigma"]
+            print(f"\n{name:26s} {key:14s} true {true[key]:8.4g} found {found['value']:8.4g}", end="")
+            print(f" +- {found['sigma']:7.2g} {found['value'] / true[key] - 1.0:+7.1%} {off:+5.1f} sigma", end="")
+            assert abs(off) < RESERVE
+    assert "line_px" in told and not one.told["line_px"]["kept"]
 
 
 def test_what_is_told_is_as_sure_as_is_said() -> None:

@@ -39,6 +39,7 @@ DIVERGENCE, THIN = Divergence(full_angle=4e-3), Waist(radius=0.35e-3, focus_dist
 NEAR = Waist(radius=0.2e-3, focus_distance=0.80, m_squared=30.0)
 NEARER = Waist(radius=0.2e-3, focus_distance=0.77, m_squared=30.0)
 """Sheets that are about as wide everywhere, and such that widen on the parts."""
+WIDE = Divergence(full_angle=7e-3)
 LAMP = 1.0
 """Of the template's lamps, where a photograph has other light."""
 
@@ -201,10 +202,25 @@ THIN_LINES = {
 """At one phase of the pixels, so that how the line's width is shared by sheet and blur changes what its width is."""
 
 
+OTHERS = {
+    "weld seam": Scanner("weld_seam"),
+    "step block": Scanner("step_block"),
+    "groove, wide": Scanner("v_groove", sheet=WIDE),
+    "sphere, wide": Scanner("sphere", sheet=WIDE),
+    "phone sphere": replace(SCANNERS["phone plane"], template="sphere"),
+    "phone weld seam": replace(SCANNERS["phone groove"], template="weld_seam"),
+    "phone step block": replace(SCANNERS["phone groove"], template="step_block"),
+    "webcam groove": replace(SCANNERS["webcam plane"], template="v_groove", speckle="off"),
+    "webcam step block": replace(SCANNERS["webcam plane"], template="step_block", speckle="off"),
+}
+"""Scanners that no twin is judged by, whose rehearsals by the true numbers tell what rehearsals leave out."""
+
+
 def truths(true: Project) -> dict[str, float]:
     sensor = true.sensor
     return {"blur_px": sensor.blur_sigma / true.scene.camera.pixel_pitch, "halo": sensor.halo,
-            "gain": numbers_of(true, 0).gain, "read_noise": sensor.read_noise, "scatter": sensor.prnu}  # fmt: skip
+            "gain": numbers_of(true, 0).gain, "read_noise": sensor.read_noise, "scatter": sensor.prnu,
+            "laser_power_w": true.scene.lasers[0].power}  # fmt: skip
 
 
 if __name__ == "__main__":

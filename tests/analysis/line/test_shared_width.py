@@ -9,7 +9,7 @@ from scipy.stats import chi2
 from analysis.line.detection.detect import PRIOR_WIDTHS
 from analysis.line.extract import extract
 from analysis.line.methods.shared_width import width_priors
-from analysis.line.result import Line
+from analysis.line.result import Flag, Line
 from analysis.measures import means
 from tests.analysis.line.line_images import electrons, expected, exposed
 
@@ -42,7 +42,7 @@ def test_means_of_narrow_lines_do_not_scatter_more_than_told(sigma):
         assert line.length_apart is not None and line.shared_u is not None
         told = (line.sigma_u[at, 0], line.length_apart[at, 0], line.shared_u[at, 0])
         for count, sums in found.items():
-            seen, foretold = means(error[at], *told, at, np.zeros_like(at), count)
+            seen, foretold = means(error[at], *told, np.zeros(len(at), np.bool_), at, np.zeros_like(at), count)
             sums.append((float(np.sum(seen**2)), float(np.sum(foretold**2))))
     for count, sums in found.items():
         seen, foretold = np.sum(sums, axis=0)
@@ -65,6 +65,20 @@ def test_the_correlation_length_holds_both_parts():
     )
     assert half.correlation_length is not None
     assert half.correlation_length[150, 0] == pytest.approx(0.5 * 2.0 + 0.5 * 65.0)
+
+
+def test_what_is_beside_misfits_is_alike_on_all_scan_lines_that_are_looked_at():
+    """Told by the triangle of a shared width, a mean over 100 that all have one neighbour was 1.4 times as far off."""
+    one = np.ones((ROWS, 1))
+    flag = np.full((ROWS, 1), Flag.BLENDED, np.uint8)
+    line = Line("rows", "", one, one, one, one, one, one, flag, length_apart=one, shared_u=one)
+    assert line.correlation_length is not None
+    assert line.correlation_length[150, 0] == pytest.approx(2 * 64 + 1)
+    flag[150:] = Flag.UNRESOLVED  # a narrow line beside them has the width in common, with the narrow ones
+    weights = 1.0 - np.arange(65) / 65.0
+    assert line.correlation_length is not None
+    assert line.correlation_length[200, 0] == pytest.approx(2.0 * weights.sum() - 1.0)
+    assert line.correlation_length[149, 0] == pytest.approx(65.0 + weights[1:].sum())
 
 
 def told_of(width: np.ndarray, sigma: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from scipy.ndimage import convolve1d, gaussian_filter
 
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.extract import extract
-from analysis.line.result import Flag, Line
+from analysis.line.result import SYSTEMATIC, Flag, Line
 from analysis.measures import means
 from tests.analysis.line.line_images import electrons, expected
 
@@ -186,7 +186,7 @@ def variance_of_means(line: Line, centre: Array, rows: int) -> float:
     shared = np.zeros(len(line.u)) if line.shared_u is None else line.shared_u[:, 0]
     assert line.length_apart is not None
     error, sigma, length = line.u[:, 0] - centre, line.sigma_u[:, 0], line.length_apart[:, 0]
-    of_rows = (one[index] for one in (error, sigma, length, shared))
+    of_rows = (one[index] for one in (error, sigma, length, shared, np.isin(line.flag[:, 0], SYSTEMATIC)))
     found, told = means(*of_rows, index, np.zeros_like(index), rows)
     return float(np.mean(found**2) / np.mean(told**2))
 

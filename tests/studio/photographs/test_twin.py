@@ -17,7 +17,8 @@ from render.laser.laser import Divergence, Waist
 from render.run import Run
 from render.sensor.develop import develop, expected_electrons
 from render.world.world import build_world
-from studio.photographs.line_profile import Stretch
+from studio.photographs import twin_noise, twin_profile
+from studio.photographs.line_profile import Profile, Stretch, Transfer
 from studio.photographs.twin import fitted
 from studio.photographs.twin_light import numbers_of
 from studio.photographs.twin_profile import blurred_line
@@ -133,3 +134,59 @@ def test_a_focused_sheet_is_wider_by_the_same_at_every_distance() -> None:
     z = np.linspace(0.5, 1.2, 8)
     assert wider(focused, 1.3).sigma(z) == pytest.approx(1.3 * focused.sigma(z))
     assert wider(laser, 1.3).sigma(z) == pytest.approx(1.3 * laser.sigma(z), rel=1e-6)
+
+
+def photon_transfer(values: np.ndarray, mean: np.ndarray) -> Transfer:
+    """The exact noise of a sensor, (3,) as `twin_noise.Noise` has it, at some means, DN."""
+    exact = Transfer(mean, mean - 40.0, mean, 0.02 * mean, np.arange(len(mean) + 1.0), 0.0, 0.01)
+    variance = twin_noise.expected(values, exact, 32.0)
+    return replace(exact, variance=variance, sigma=0.02 * variance)
+
+
+def test_a_rehearsal_on_darker_ground_takes_nothing_off_the_noise() -> None:
+    """Compared at the photographs' light, ground that was 8 DN darker made the read noise a fifth too large."""
+    true = np.array([0.27, 7.3, 0.0])
+    found = photon_transfer(true, np.linspace(85.0, 3000.0, 12))
+    darker = photon_transfer(true, found.mean - 8.0)
+    usual = twin_noise.expected(true, darker, 32.0)
+    left = twin_noise.less(found, darker.variance, np.ones(12), usual)
+    np.testing.assert_allclose(left.variance, found.variance)
+
+
+def test_noise_is_as_sure_as_what_a_rehearsal_leaves_out_lets_it_be() -> None:
+    """Against fits of noise that is off by as much by chance: 2000 tell a standard deviation to 1.6 %."""
+    true, random = np.array([0.27, 7.3, 0.0]), np.random.default_rng(4)
+    found = photon_transfer(true, np.linspace(85.0, 3000.0, 12))
+    left_out = 0.06 * found.variance
+    told = twin_noise.fit_noise(found, 32.0, 0.0, True, left_out).left_out
+    off = [replace(found, variance=found.variance + left_out * random.standard_normal(12)) for _ in range(2000)]
+    scatter = np.std([twin_noise.fit_noise(one, 32.0, 0.0, True, 0.0 * left_out).values for one in off], axis=0)
+    np.testing.assert_allclose(told[:2], scatter[:2], rtol=3.5 * 0.016)
+
+
+@pytest.mark.parametrize(("sheet", "most"), [(0.18, None), (3.0, 0.03)])
+def test_what_a_thin_lines_width_is_hangs_on_how_sheet_and_blur_share_it(sheet: float, most: float | None) -> None:
+    """At one phase of the pixels: all sheet, all blur and a mixture look alike, and are of unlike width."""
+    random, count, half, blur = np.random.default_rng(6), 512, 40, 0.36
+    distance = np.arange(-half, half + 1) - np.full((count, 1), 0.2)
+    electrons = 100.0 + 12_000.0 * blurred_line(distance, sheet, blur)
+    zeros, rows = np.zeros(count), np.arange(count)
+    # positions that are known to 0.02 px spread one phase over a bin
+    about = distance + random.normal(0.0, 0.02, (count, 1))
+    stretch = Stretch(random.poisson(electrons).astype(float), about, zeros, rows, zeros.astype(np.intp))
+    piece = Piece(stretch, np.full(count, sheet), zeros, np.ones(count), zeros)
+    parts = twin_profile.parts_of(Seen([piece], max(sheet, 0.6), None, facing=False))
+    shape = twin_profile.fit_shape(parts, np.array([1.0, 0.13, 0.0, 6.0]), halo=False)
+    off = shape.best[0] * sheet**2 + shape.best[1] - sheet**2 - blur
+    assert not shape.apart
+    assert abs(off) < 3.0 * np.hypot(shape.line, shape.unlike / np.sqrt(3.0))
+    relative = shape.unlike / (sheet**2 + blur)
+    assert relative > 0.3 if most is None else relative < most
+
+
+def test_what_a_rehearsal_shows_nothing_of_is_left_out() -> None:
+    """A rehearsal may lose all scan lines of a short stretch: that stopped the fit with an internal error."""
+    profile = Profile(np.linspace(-3.0, 3.0, 30), np.ones(30), np.ones(30))
+    parts = [twin_profile.Part(profile, 1.0, 0.0, 1.0, place) for place in (0, 1, 2)]
+    departed = twin_profile.departures(np.array([1.0, 0.5, 0.0, 5.0]), [parts[0], parts[2]])
+    assert [one.place for one in twin_profile.less(parts, departed)] == [0, 2]
