@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable
 
 from render.base.errors import Cancelled
+from render.base.helper_threads import beside
 
 Cancel = Callable[[], bool]
 Progress = Callable[[float], None]
@@ -49,8 +50,7 @@ def map_chunks(
 ) -> None:
     """Call work(start, stop) over range(count) in chunks. Raises Cancelled between chunks; progress gets 0..1.
 
-    The calling thread works as well, and alone reports progress: starting a pool would cost a short call more than its
-    work.
+    The calling thread works as well, and alone reports progress.
     """
     starts = range(0, count, chunk)
     lock, left = threading.Lock(), iter(starts)
@@ -78,15 +78,18 @@ def map_chunks(
         except BaseException as error:
             failed.append(error)
 
-    helpers = [threading.Thread(target=helper) for _ in range(min(thread_count(threads), len(starts)) - 1)]
-    for thread in helpers:
-        thread.start()
+    helpers = [beside(helper) for _ in range(min(thread_count(threads), len(starts)) - 1)]
     try:
         run_chunks(progress)
     except BaseException as error:
         failed.append(error)
-    for thread in helpers:
-        thread.join()
+    for ended in helpers:
+        while True:
+            try:
+                ended.acquire()
+                break
+            except BaseException as error:  # Ctrl-C, which the helpers hear of at their next chunk
+                failed.append(error)
     if failed:
         raise failed[0]
     if helpers and progress is not None:

@@ -116,25 +116,27 @@ def undecided_rows(project: Project, goal: DepthGoal, frame: Frame, laser: int, 
     line = extract_line(project, image, laser, threads)
     floor = noise_model(image, project, laser).floor
     found = np.zeros(len(line.valid), np.bool_)
+    images: tuple[Any, Any] = np.empty_like(electrons), np.empty_like(electrons)
     for pair in range(PAIRS):
         noise = floor, DECISION * goal.depth, wrapped(project.seed + PAIRS * laser + pair)
-        one, other = (
-            extract_line(project, replace(image, pixels=pixels), laser, threads)
-            for pixels in _opposite(image, electrons, noise, threads)
-        )
+        _set_opposite(image, electrons, noise, images, threads)
+        one, other = (extract_line(project, replace(image, pixels=pixels), laser, threads) for pixels in images)
         bent = np.abs(one.u + other.u - 2.0 * line.u) > JUMP * goal.depth * line.sigma_u
         changed = (one.valid != line.valid) | (other.valid != line.valid)
         found |= np.any(changed | (line.valid & bent), axis=1)
     return int(found.sum())
 
 
-def _opposite(
-    image: Image, electrons: Float32, noise: tuple[float, float, int], threads: int | None
-) -> tuple[Any, Any]:
-    """Pixels (h, w) of the image of mean electrons (h, w) as `opposite_images` makes them."""
+def _set_opposite(
+    image: Image,
+    electrons: Float32,
+    noise: tuple[float, float, int],
+    pair: tuple[Float32, Float32],
+    threads: int | None,
+) -> None:
+    """Two images (h, w) of mean electrons (h, w), as `opposite_images` makes them; image: that without noise."""
     from render.sensor.opposite_images import opposite_images
 
-    pair: tuple[Any, Any] = np.empty_like(electrons), np.empty_like(electrons)
     numbers = image.gain, image.black_level, float(image.saturation)
 
     def work(start: int, stop: int) -> None:
@@ -142,7 +144,6 @@ def _opposite(
         opposite_images(electrons[some], start, noise, numbers, (pair[0][some], pair[1][some]))
 
     map_chunks(work, len(electrons), rows_of(electrons.shape[1], ROWS, PIXELS), threads)
-    return pair
 
 
 def _weigh(
