@@ -135,8 +135,8 @@ def _drawn(
     direct = tuple(image if i == stage.laser else np.zeros_like(image) for i in range(len(scene.lasers)))
     radiance = _radiance(sensor, numbers, ground, joule)
     between = _between(radiance, piece, upright.shape)
-    ambient = between if axis == "rows" else between.swapaxes(0, 1)
-    ambient = np.ascontiguousarray(ambient / np.maximum(illumination, 1e-6)[..., None], np.float32)
+    turned = between if axis == "rows" else between.swapaxes(0, 1)
+    ambient: Float32 = np.ascontiguousarray(turned / np.maximum(illumination, 1e-6)[..., None], np.float32)
     return Frame(0, direct, ambient=ambient, curves=(), truth=None)
 
 

@@ -72,8 +72,8 @@ def parts_of(seen: Seen) -> list[Part]:
     parts = []
     for k in np.unique(place):
         some = np.flatnonzero(place == k)
-        means = (float(np.mean(one[some])) for one in (whole.sheet**2, added, whole.tilt))
-        parts.append(Part(mean_profile(whole.stretch, some, seen.width), *means, int(k)))
+        sheet, known, tilt = (float(np.mean(one[some])) for one in (whole.sheet**2, added, whole.tilt))
+        parts.append(Part(mean_profile(whole.stretch, some, seen.width), sheet, known, tilt, int(k)))
     if any(len(one.profile.value) < SHORTEST or not one.profile.value.max() > 0.0 for one in parts):
         raise InputError(
             "the line's profile cannot be told",
