@@ -10,12 +10,12 @@ distance, taken as one standard deviation, makes two hold the error, or nearly.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
 from analysis.line.result import Line
 from render.base.arrays import Float
+from studio.photographs.line_arrays import less_sure
 
 BLUR = 1.4
 """px: a lens of 0.6 px, filling in of 0.7 px (`analysis.line.shared_noise.FINEST`) and denoising of 1 px, in
@@ -29,11 +29,7 @@ with this one's."""
 
 def with_blur_along(line: Line, course: Line) -> Line:
     """A line (n, k) -> the same with what blur may move it by in sigma; course: the same line, smoothed along."""
-    rounded = _rounded_by(course) ** 2
-    told = np.ones_like(line.u) if line.length_apart is None else line.length_apart
-    variance, alike = line.variance_apart, 2.0 * math.sqrt(math.pi) * BLUR
-    length = (variance * told + rounded * alike) / np.maximum(variance + rounded, 1e-300)
-    return replace(line, sigma_u=np.sqrt(line.sigma_u**2 + rounded), length_apart=length)
+    return less_sure(line, _rounded_by(course) ** 2, 2.0 * math.sqrt(math.pi) * BLUR)
 
 
 def _rounded_by(line: Line) -> Float:

@@ -25,6 +25,14 @@ def column(line: Line, k: int) -> Line:
     return changed(line, lambda values: values[:, k : k + 1], line.flag[:, k : k + 1])
 
 
+def less_sure(line: Line, variance: NDArray[np.float64], alike: NDArray[np.float64] | float) -> Line:
+    """The line with errors more in its sigmas, of a variance (n, k) px^2, of which so many neighbours err alike."""
+    told = np.ones_like(line.u) if line.length_apart is None else line.length_apart
+    own = line.variance_apart
+    length = (own * told + variance * alike) / np.maximum(own + variance, 1e-300)
+    return replace(line, sigma_u=np.sqrt(line.sigma_u**2 + variance), length_apart=length)
+
+
 def side_by_side(lines: Sequence[Line], candidates: Line) -> Line:
     """Lines (n, 1) of the candidates -> (n, k)."""
     if len(lines) == 1:

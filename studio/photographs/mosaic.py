@@ -25,7 +25,6 @@ itself by the scatter along the line (`analysis/line/shared_noise.py`).
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -35,6 +34,7 @@ from scipy.ndimage import median_filter
 from analysis.line.result import Flag, Line
 from analysis.line.shared_noise import DEGREE, FEWEST_RUNS, RUNS
 from studio.photographs.laser_light import Channel
+from studio.photographs.line_arrays import less_sure
 
 Floats = NDArray[np.float64]
 
@@ -94,12 +94,8 @@ def with_mosaic(line: Line, channel: Channel, gain: float) -> Line:
     slope = _slope(line)
     share = np.interp(np.mod(slope, PERIOD), SLOPES, _followed())
     extra = np.where(full | near, clipped, open_) ** 2 * share
-    told = np.ones_like(line.u) if line.length_apart is None else line.length_apart
     longest = max(int(line.valid.sum()), 1)
-    alike = np.clip(0.5 * PERIOD / np.maximum(slope, 1e-9), 1.0, longest)
-    variance = line.variance_apart
-    length = (variance * told + extra * alike) / (variance + extra)
-    return replace(line, sigma_u=np.sqrt(line.sigma_u**2 + extra), length_apart=length)
+    return less_sure(line, extra, np.clip(0.5 * PERIOD / np.maximum(slope, 1e-9), 1.0, longest))
 
 
 def _slope(line: Line) -> Floats:
