@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.base.arrays import Bool, Float, Float32, Int
+from render.base.arrays import Bool, Float, Float32, Int, Long
 
 NEIGHBOURS = 5
 """Scan lines whose variances are taken together: a few batches say little of a single one."""
@@ -28,8 +28,12 @@ class LineMoves:
             np.any([move != 0.0 for move in moves], axis=0) if moves else np.zeros(len(line), np.bool_)
         )
         """(m,) a line is measured on the pixel. All these pixels of a line have as many samples."""
-        self.line, self.lines = line[self.measured], lines
-        self.weights = [move[self.measured] for move in moves]
+        self.on: Long = np.flatnonzero(self.measured)
+        """Those pixels; `first_pixel` is one of each line, 0 of lines that are not measured."""
+        self.line, self.lines = line[self.on], lines
+        self.first_pixel = np.zeros(lines, np.int64)
+        self.first_pixel[self.line] = self.on
+        self.weights = [move[self.on] for move in moves]
         self.pixels = np.bincount(self.line, minlength=lines)
         self.lit = np.array([np.bincount(self.line, np.abs(weight), lines) > 0.0 for weight in self.weights])
         shape = len(moves), 3, lines
@@ -38,15 +42,15 @@ class LineMoves:
 
     def add(self, sums: Float32, count: Int) -> None:
         """A batch: radiance (m, 2, 3) of both halves, summed over count (m, 2) samples of each pixel."""
-        first = np.zeros(self.lines, np.int64)
-        first[self.line] = np.flatnonzero(self.measured)
+        new = np.flatnonzero(count[self.on].any(axis=1))
+        on, line = self.on[new], self.line[new]
         for half in range(2):
-            n = np.where(self.pixels > 0, count[first, half], 0).astype(np.float64)
-            light = sums[self.measured, half].astype(np.float64)
+            n = np.where(self.pixels > 0, count[self.first_pixel, half], 0).astype(np.float64)
             each = np.maximum(n, 1.0)
-            for i, weight in enumerate(self.weights):
-                for band in range(3):
-                    moved = np.bincount(self.line, weight * light[:, band], self.lines) / each
+            for band in range(3):
+                light = sums[on, half, band].astype(np.float64)
+                for i, weight in enumerate(self.weights):
+                    moved = np.bincount(line, weight[new] * light, self.lines) / each
                     self.first[i, band] += n * moved
                     self.second[i, band] += n * moved**2
             self.samples += n

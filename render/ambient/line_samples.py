@@ -46,6 +46,8 @@ PILOT, GROWTH, PASSES = 2, 4.0, 12
 """Samples of each half on every pixel at first; most by which a pass multiplies those of a scan line; most passes."""
 FAR = 8.0
 """Times the samples of a line that may just not miss the goal: lines that need more are out of its reach."""
+LITTLE = 0.005
+"""Of all samples so far: a pass that asked for no more is the last. Chosen, not tuned."""
 SURE, SURE_LINES = 0.05, 0.99
 """Of the variance that a scan line may have, and share of the lines: where a single sample of each half tells less of
 so many, no more are drawn. Of one line they tell little, as light through a gap is met by one sample in many."""
@@ -124,10 +126,12 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
     moves = LineMoves(band.moves, band.line, lines)
 
     def add(batch: int, count: Int, part: Run) -> None:
-        sums, done = film.sums.copy(), film.done.copy()
-        keys = np.where(band.keys < band.place.size, band.keys, band.keys + np.int32(batch * lines))
-        film.add(paths, band.pixels, count, part, keys)
-        moves.add(film.sums - sums, count - done)
+        sums, more = film.sums.copy(), count - film.done
+        new = np.flatnonzero(more.any(axis=1))
+        keys = band.keys[new]
+        keys = np.where(keys < band.place.size, keys, keys + np.int32(batch * lines))
+        film.add(paths, band.pixels[new], count[new], part, keys)
+        moves.add(film.sums - sums, more)
 
     def known() -> Float:
         some = np.unique(band.line[(band.weight > 0.0) | moves.measured])
@@ -144,9 +148,9 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
         if asked > left:
             count = film.done + (more * (left / asked)).astype(np.int32)
             more = count - film.done
-        if not more.any():
-            break
         add(level, count, run.between(0.3, 1.0))
+        if asked <= LITTLE * film.total:
+            break
     return np.sqrt(known())
 
 
@@ -165,34 +169,43 @@ def _moments(film: PixelSamples, band: Band, threads: int | None) -> Float:
 def _wanted(film: PixelSamples, band: Band, moves: LineMoves, threads: int | None) -> Int:
     """(m, 2) samples of each half for the scan lines to meet the goal: as many on all pixels that a line is measured
     on, beside them as the other half's variance says."""
-    done, heavy, measured = film.done, np.flatnonzero(band.weight), moves.measured
+    done, heavy = film.done, np.flatnonzero(band.weight)
     moments, moved = MARGIN * _moments(film, band, threads), MARGIN * moves.variance
-    spread, lines = film.spread.astype(np.float64), len(moments)
-    deviation = (
-        np.sqrt([_pooled(spread[:, other], band, heavy, threads).max(axis=1) for other in (1, 0)]) * band.weight[heavy]
-    )
-    both = deviation, done[heavy].T
-    total, now = np.array([[np.bincount(band.line[heavy], half, lines) for half in one] for one in both])
-    alone = _needed(now, moments, MARGIN * total**2 / 2.0)
-    count = np.maximum(moves.pixels, 1)
-    each_now = np.bincount(band.line[measured], done[measured].mean(axis=1), lines) / count
+    lines = len(moments)
+    alone, spent_alone, deviation = np.zeros((2, lines)), np.zeros((2, lines)), np.zeros((2, 0))
+    if len(heavy):
+        spread = film.spread.astype(np.float64)
+        deviation = np.sqrt([_pooled(spread[:, other], band, heavy, threads).max(axis=1) for other in (1, 0)])
+        deviation *= band.weight[heavy]
+        total = _of_lines(deviation, band.line[heavy], lines)
+        spent_alone = _of_lines(done[heavy].T, band.line[heavy], lines)
+        alone = _needed(spent_alone, moments, MARGIN * total**2 / 2.0)
+    each_now = np.where(moves.pixels > 0, done[moves.first_pixel, 0], 0).astype(np.float64)
     each = _needed(each_now, moved, np.inf)
     # those that may miss the goal get as much as the others at most; where that is nothing beside what they need, and
     # most of all samples would not get them there, as much as the others have
-    asked, spent = alone.sum(axis=0) + 2.0 * count * each, now.sum(axis=0) + 2.0 * count * each_now
+    asked = alone.sum(axis=0) + 2.0 * moves.pixels * each
+    spent = spent_alone.sum(axis=0) + 2.0 * moves.pixels * each_now
     some = spent > 0.0
     most = known_below(asked[some])
     far = asked > FAR * most
     share = np.where(far, spent[some & ~far].mean() if some.any() else 0.0, most)
     capped = np.minimum(1.0, share / np.maximum(asked, 1.0))
-    alone, each = _step(now, alone, moments, capped), _step(each_now, each, moved, capped)
-    wanted, of_heavy = done.copy(), band.line[heavy]
-    each_pixel = alone[:, of_heavy] * deviation / np.maximum(total, 1e-300)[:, of_heavy]
-    wanted[heavy] = np.maximum(done[heavy], np.ceil(each_pixel).T.astype(np.int32))
+    each = _step(each_now, each, moved, capped)
+    wanted = done.copy()
+    if len(heavy):
+        alone = _step(spent_alone, alone, moments, capped)
+        each_pixel = (alone / np.maximum(total, 1e-300))[:, band.line[heavy]] * deviation
+        wanted[heavy] = np.maximum(done[heavy], np.ceil(each_pixel).T.astype(np.int32))
+        np.maximum.at(each, moves.line, wanted[moves.on].max(axis=1))
     # as many of both halves, on all that a line is measured on
-    np.maximum.at(each, band.line[measured], wanted[measured].max(axis=1))
-    wanted[measured] = np.ceil(each)[band.line[measured], None]
+    wanted[moves.on] = np.maximum(each_now, np.ceil(each))[moves.line, None]
     return wanted
+
+
+def _of_lines(halves: Float | Int, line: Int, lines: int) -> Float:
+    """Sums (2, lines) of both halves (2, n) of pixels."""
+    return np.array([np.bincount(line, half, lines) for half in halves])
 
 
 def _needed(now: Float, moments: Float, most: Float | float) -> Float:

@@ -23,7 +23,7 @@ def return_large_blocks() -> None:
 
 
 def return_what_is_free() -> None:
-    """After much was given up at once, as when a project is closed. Some tens of milliseconds."""
+    """After much was given up at once: a project is closed, a scan has its frames. Some tens of milliseconds."""
     gc.collect()
     _call("malloc_trim", 0)
 

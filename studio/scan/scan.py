@@ -19,6 +19,7 @@ from render.world.world import World, build_world
 from studio.project.date_and_time import now
 from studio.project.input_files import input_hashes
 from studio.project.project import Project
+from studio.runtime.memory import return_what_is_free
 from studio.scan import scan_folder
 from studio.scan.cautions import Cautions
 from studio.scan.depth_noise import foreseen_noise, noise_records, reached_noise, with_foretold
@@ -122,6 +123,8 @@ def run_scan(
             foreseen = with_foretold(foreseen, scan.plan.foretold, count)
         listener.foreseen(foreseen)
         _take_frames(scan, first, count, written, measuring)
+        if count > 1:
+            return_what_is_free()  # so that what the points and the report take comes in place of what frames took
         result: dict[str, Any] = {
             "name": project.name,
             "created": now(),
