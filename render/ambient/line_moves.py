@@ -7,6 +7,9 @@ which moves a line by M_r, and R of these so far, N samples and the mean M in al
 
 where the variance of M_r falls as 1 / n_r. A batch spreads its samples evenly, so that it falls sooner: the estimate is
 rather too high.
+
+A pixel of little weight is soon known as well as its line needs it, whatever the others do: it is settled, and stands
+with the mean that it has in what later batches do to the line.
 """
 
 from __future__ import annotations
@@ -19,6 +22,10 @@ NEIGHBOURS = 5
 """Scan lines whose variances are taken together: a few batches say little of a single one."""
 
 
+SETTLED = 0.2
+"""Of what a line may be off, for all its settled pixels. Chosen, not tuned."""
+
+
 class LineMoves:
     """The moments of what batches of samples do to the lines; grows by batches."""
 
@@ -27,22 +34,44 @@ class LineMoves:
         self.measured: Bool = (
             np.any([move != 0.0 for move in moves], axis=0) if moves else np.zeros(len(line), np.bool_)
         )
-        """(m,) a line is measured on the pixel. All these pixels of a line have as many samples."""
+        """(m,) a line is measured on the pixel. Of one line all that are not settled have as many samples."""
         self.on: Long = np.flatnonzero(self.measured)
-        """Those pixels; `first_pixel` is one of each line, 0 of lines that are not measured."""
         self.line, self.lines = line[self.on], lines
-        self.first_pixel = np.zeros(lines, np.int64)
-        self.first_pixel[self.line] = self.on
         self.weights = [move[self.on] for move in moves]
+        self.weight: Float = np.max(np.abs(self.weights), axis=0) if moves else np.zeros(0)
+        """The largest of each pixel, without its sign."""
+        self.first_pixel = np.zeros(lines, np.int64)
+        """Of each line that with the largest weight, which is never settled; 0 of lines that are not measured."""
+        order = np.lexsort((self.weight, self.line))
+        self.first_pixel[self.line[order]] = self.on[order]
+        self.open: Bool = np.ones(len(self.on), np.bool_)
+        """The pixels that are not settled."""
+        self.settled: Float = np.zeros(lines)
+        """How far those that are move the lines, all the same way as their random numbers are the same."""
         self.pixels = np.bincount(self.line, minlength=lines)
         self.lit = np.array([np.bincount(self.line, np.abs(weight), lines) > 0.0 for weight in self.weights])
         shape = len(moves), 3, lines
         self.batches, self.samples = np.zeros(lines), np.zeros(lines)
         self.first, self.second = np.zeros(shape), np.zeros(shape)
 
-    def add(self, sums: Float32, count: Int) -> None:
-        """A batch: radiance (m, 2, 3) of both halves, summed over count (m, 2) samples of each pixel."""
-        new = np.flatnonzero(count[self.on].any(axis=1))
+    def settle(self, some: Long, variance: Float) -> None:
+        """Settle those of some pixels, places (n,) in `on`, whose weight leaves their line as well known.
+
+        variance: (n,) of their means. Of a line the largest counts for all: chance makes single ones far too small.
+        """
+        line, largest = self.line[some], np.zeros(self.lines)
+        np.maximum.at(largest, line, variance)
+        moved = self.weight[some] * np.sqrt(largest[line])
+        known = (moved * self.pixels[line] <= SETTLED) & (self.on[some] != self.first_pixel[line])
+        self.open[some[known]] = False
+        np.add.at(self.settled, line[known], moved[known])
+
+    def add(self, sums: Float32, count: Int, means: Float32) -> None:
+        """A batch: radiance (m, 2, 3) of both halves, summed over count (m, 2) samples of each pixel.
+
+        means: (n, 3) of all samples so far of the settled pixels, in the order of `on`.
+        """
+        new, shut = np.flatnonzero(self.open & count[self.on].any(axis=1)), np.flatnonzero(~self.open)
         on, line = self.on[new], self.line[new]
         for half in range(2):
             n = np.where(self.pixels > 0, count[self.first_pixel, half], 0).astype(np.float64)
@@ -51,6 +80,8 @@ class LineMoves:
                 light = sums[on, half, band].astype(np.float64)
                 for i, weight in enumerate(self.weights):
                     moved = np.bincount(line, weight[new] * light, self.lines) / each
+                    if len(shut):
+                        moved += np.bincount(self.line[shut], weight[shut] * means[:, band], self.lines)
                     self.first[i, band] += n * moved
                     self.second[i, band] += n * moved**2
             self.samples += n
@@ -72,7 +103,7 @@ class LineMoves:
             ]
         )
         found = np.where(self.lit[:, None], summed / np.maximum(together, 1.0), 0.0)
-        return np.asarray(found.max(axis=(0, 1)))
+        return np.asarray(found.max(axis=(0, 1)) + self.settled**2)
 
 
 def _neighbours(values: Float) -> Float:

@@ -131,7 +131,8 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
         keys = band.keys[new]
         keys = np.where(keys < band.place.size, keys, keys + np.int32(batch * lines))
         film.add(paths, band.pixels[new], count[new], part, keys)
-        moves.add(film.sums - sums, more)
+        settled = film.means(band.pixels[moves.on[~moves.open]]).mean(axis=1)
+        moves.add(film.sums - sums, more, settled)
 
     def known() -> Float:
         some = np.unique(band.line[(band.weight > 0.0) | moves.measured])
@@ -159,11 +160,16 @@ def _moments(film: PixelSamples, band: Band, threads: int | None) -> Float:
     heavy = np.flatnonzero(band.weight)
     if not len(heavy):
         return np.zeros(max(band.place.shape))
-    halves, count = film.means().astype(np.float64), 1.0 / film.done
-    single = (halves[:, 0] - halves[:, 1]) ** 2 / count.sum(axis=1)[:, None]
-    variance = _pooled(single, band, heavy, threads) * count[heavy].sum(axis=1)[:, None] / 4.0
+    variance = _variance(film, band, heavy, threads)
     weight, line = band.weight[heavy] ** 2, band.line[heavy]
     return np.max([np.bincount(line, weight * colour, max(band.place.shape)) for colour in variance.T], axis=0)
+
+
+def _variance(film: PixelSamples, band: Band, some: Long, threads: int | None) -> Float:
+    """(n, 3) of the means of some of the band's pixels, by what both halves differ by there and beside them."""
+    halves, count = film.means().astype(np.float64), 1.0 / film.done
+    single = (halves[:, 0] - halves[:, 1]) ** 2 / count.sum(axis=1)[:, None]
+    return _pooled(single, band, some, threads) * count[some].sum(axis=1)[:, None] / 4.0
 
 
 def _wanted(film: PixelSamples, band: Band, moves: LineMoves, threads: int | None) -> Int:
@@ -180,12 +186,13 @@ def _wanted(film: PixelSamples, band: Band, moves: LineMoves, threads: int | Non
         total = _of_lines(deviation, band.line[heavy], lines)
         spent_alone = _of_lines(done[heavy].T, band.line[heavy], lines)
         alone = _needed(spent_alone, moments, MARGIN * total**2 / 2.0)
+    pixels = np.bincount(moves.line[moves.open], minlength=lines)
     each_now = np.where(moves.pixels > 0, done[moves.first_pixel, 0], 0).astype(np.float64)
     each = _needed(each_now, moved, np.inf)
     # those that may miss the goal get as much as the others at most; where that is nothing beside what they need, and
     # most of all samples would not get them there, as much as the others have
-    asked = alone.sum(axis=0) + 2.0 * moves.pixels * each
-    spent = spent_alone.sum(axis=0) + 2.0 * moves.pixels * each_now
+    asked = alone.sum(axis=0) + 2.0 * pixels * each
+    spent = spent_alone.sum(axis=0) + 2.0 * pixels * each_now
     some = spent > 0.0
     most = known_below(asked[some])
     far = asked > FAR * most
@@ -197,9 +204,12 @@ def _wanted(film: PixelSamples, band: Band, moves: LineMoves, threads: int | Non
         alone = _step(spent_alone, alone, moments, capped)
         each_pixel = (alone / np.maximum(total, 1e-300))[:, band.line[heavy]] * deviation
         wanted[heavy] = np.maximum(done[heavy], np.ceil(each_pixel).T.astype(np.int32))
-        np.maximum.at(each, moves.line, wanted[moves.on].max(axis=1))
-    # as many of both halves, on all that a line is measured on
-    wanted[moves.on] = np.maximum(each_now, np.ceil(each))[moves.line, None]
+        np.maximum.at(each, moves.line[moves.open], wanted[moves.on[moves.open]].max(axis=1))
+    each = np.maximum(each_now, np.ceil(each))
+    more = np.flatnonzero(moves.open & (each > each_now)[moves.line])
+    moves.settle(more, _variance(film, band, moves.on[more], threads).max(axis=1))
+    # as many of both halves, on all that a line is measured on and that is not settled
+    wanted[moves.on[moves.open]] = each[moves.line[moves.open], None]
     return wanted
 
 
