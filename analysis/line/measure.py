@@ -163,8 +163,10 @@ def measure_with_neighbours(
         priors: NDArray[np.float64] | None = None,
         again: NDArray[np.bool_] | None = None,
     ) -> None:
-        if again is not None and not again[start:stop].any():
-            return
+        if again is not None:
+            start, stop = _asked_for(again, start, stop)
+            if start == stop:
+                return
         first, last = max(0, start - halo), min(lines.count, stop + halo)
         signal, mask, floor = lines.read(first, last)
         own = slice(start - first, stop - first)
@@ -176,11 +178,9 @@ def measure_with_neighbours(
         room = np.empty((ROOM, signal.shape[1]))
         room[:, :USUAL_WINDOW] = np.nan  # what is read before it is written shows
         pixels = Pixels(signal, mask, floor, correlation, own.start, room, *scattering)
-        if again is None:
-            run(pixels, seeds, found, options, out[start:stop])
-            flags[start:stop] = found
-            return
-        measured, chosen = np.empty_like(out[start:stop]), again[start:stop]
+        chosen = np.ones(found.shape, np.bool_) if again is None else again[start:stop]
+        found[~chosen] = Flag.REJECTED  # the kernel leaves out what is none
+        measured = np.empty_like(out[start:stop])
         run(pixels, seeds, found, options, measured)
         out[start:stop][chosen], flags[start:stop][chosen] = measured[chosen], found[chosen]
 
@@ -214,6 +214,12 @@ def measure_with_neighbours(
     lost = out[..., 1] > farthest
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
     return line_of(out, flags, settings, together, lines), Neighbours(priors, leaning, parted, passed)
+
+
+def _asked_for(again: NDArray[np.bool_], start: int, stop: int) -> tuple[int, int]:
+    """Of the scan lines start .. stop those from the first to the last one that is asked for."""
+    asked = start + np.flatnonzero(again[start:stop].reshape(stop - start, -1).any(axis=1))
+    return (int(asked[0]), int(asked[-1]) + 1) if len(asked) else (start, start)
 
 
 def _shared_widths(out: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, NDArray[np.float64]]:
