@@ -15,6 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.ambient import path_kernels
 from render.ambient.path_state import CLAMPED, CLAMPED_RADIANCE, INVALID
 from render.ambient.path_tracer import WAVEFRONT, CameraPaths, camera_paths
 from render.base.arrays import Float, Float32, Int
@@ -246,7 +247,7 @@ class Film:
         step = max(1, WAVEFRONT // max(2 * len(pixels), 1)) if len(tiles) == 1 else int(count.max())
         for begin in range(0, int(count.max()), step):
             some = np.clip(count - begin, 0, step).astype(np.int32)
-            paths.add(pixels, (first + begin).astype(np.int32), some, sums, counts, cancelled)
+            paths.add(pixels, (first + begin).astype(np.int32), some, path_kernels.Film(sums, counts), cancelled)
         new = sums.reshape(-1, 2, 4)[..., :3].astype(np.float32)
         if sums[:, CLAMPED_RADIANCE].any():
             for half in range(2):

@@ -87,6 +87,11 @@ class LineMoves:
             self.samples += n
             self.batches += n > 0.0
 
+    def forget(self, lines: Bool) -> None:
+        """Leave out all batches so far of some lines (lines,)."""
+        self.samples[lines] = self.batches[lines] = 0.0
+        self.first[..., lines] = self.second[..., lines] = 0.0
+
     @property
     def variance(self) -> Float:
         """(lines,) of how far the mean of all samples moves a line, for the laser and colour that it is largest for."""

@@ -19,12 +19,15 @@ the values that are averaged there.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import count as count_from
 
 import numba
 import numpy as np
 
 from render.ambient.coarse_image import TILE, CoarseImage
+from render.ambient.directions import NO_GUIDE, Draws, Guide
 from render.ambient.integrator import CONVERGENCE
+from render.ambient.line_directions import GROUP, MOST_PIXELS, ROUNDS, SAMPLES, SHARE, GuidedPixels, learned_guide
 from render.ambient.line_moves import LineMoves
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
@@ -33,7 +36,7 @@ from render.base.threads import map_chunks
 from render.importance import Importance, known_below
 from render.run import Run
 
-MARGIN = 1.3
+MARGIN = 1.4
 """By which the variance of a scan line is to be less than allowed: it is known to about a sixth only."""
 ENOUGH = 0.05
 """Of what a scan line may be off, by the error of the coarse image in one pixel: where it is less, that is enough."""
@@ -44,6 +47,9 @@ REACH, POOLED = 2, 1 << 14
 """Pixels on each side over which variances are averaged, and pixels that a thread does so for at a time."""
 PILOT, GROWTH, PASSES = 2, 4.0, 12
 """Samples of each half on every pixel at first; most by which a pass multiplies those of a scan line; most passes."""
+LEARNS, WORTH, AGAIN = 2, 256, 3
+"""Pass after which a guide of directions is learned; samples of each half on every pixel of a line from which it is
+worth its own; batches in which as many guided samples are drawn as there were before."""
 FAR = 8.0
 """Times the samples of a line that may just not miss the goal: lines that need more are out of its reach."""
 LITTLE = 0.005
@@ -123,14 +129,12 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
     Raises Cancelled.
     """
     lines = max(band.place.shape)
-    moves = LineMoves(band.moves, band.line, lines)
+    moves, guide, batches, spent = LineMoves(band.moves, band.line, lines), NO_GUIDE, count_from(0), 0
 
-    def add(batch: int, count: Int, part: Run) -> None:
+    def add(count: Int, part: Run) -> None:
         sums, more = film.sums.copy(), count - film.done
         new = np.flatnonzero(more.any(axis=1))
-        keys = band.keys[new]
-        keys = np.where(keys < band.place.size, keys, keys + np.int32(batch * lines))
-        film.add(paths, band.pixels[new], count[new], part, keys)
+        film.add(paths, band.pixels[new], count[new], part, _draws(band, next(batches), guide).of(new))
         settled = film.means(band.pixels[moves.on[~moves.open]]).mean(axis=1)
         moves.add(film.sums - sums, more, settled)
 
@@ -139,20 +143,64 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
         return np.asarray(np.maximum(_moments(film, band, run.threads), moves.variance)[some])
 
     for level in range(PILOT):
-        add(level, np.full((len(band.pixels), 2), level + 1, np.int32), run.between(0.0, 0.3))
+        add(np.full((len(band.pixels), 2), level + 1, np.int32), run.between(0.0, 0.3))
         if level == 0 and np.mean(known() <= SURE) >= SURE_LINES:
             return np.sqrt(known())
-    for level in range(PILOT, PILOT + PASSES):
+    for level in range(PASSES):
         count = _wanted(film, band, moves, run.threads)
         more = count - film.done
-        left, asked = max(most - film.total, 0), more.sum(dtype=np.int64)
+        left, asked = max(most - film.total - spent, 0), more.sum(dtype=np.int64)
         if asked > left:
             count = film.done + (more * (left / asked)).astype(np.int32)
-            more = count - film.done
-        add(level, count, run.between(0.3, 1.0))
+        add(count, run.between(0.3, 1.0))
         if asked <= LITTLE * film.total:
             break
+        if level == LEARNS:
+            learned = _learn(film, paths, band, moves, [next(batches) for _ in range(ROUNDS)], run.between(0.3, 0.5))
+            if learned is not None:
+                guide, anew = learned
+                spent = int(2 * ROUNDS * SAMPLES * np.count_nonzero(guide.row >= 0))
+                for part in range(1, AGAIN + 1):
+                    add(np.maximum(film.done, anew * part // AGAIN), run.between(0.3, 1.0))
     return np.sqrt(known())
+
+
+def _draws(band: Band, batch: int, guide: Guide) -> Draws:
+    """Of the band's pixels in a batch: those that a line is measured on have other random numbers in each."""
+    raised = band.keys + np.int32(batch * max(band.place.shape))
+    return Draws(np.where(band.keys < band.place.size, band.keys, raised), guide)
+
+
+def _learn(
+    film: PixelSamples, paths: CameraPaths, band: Band, moves: LineMoves, batches: list[int], run: Run
+) -> tuple[Guide, Int] | None:
+    """A guide for the lines that need so many samples that it is worth it; None: there are none.
+
+    Their samples so far, far more scattered than guided ones, are forgotten: (m, 2) as many are to be drawn anew.
+    Raises Cancelled.
+    """
+    now = film.done[moves.first_pixel, 0].astype(np.float64)
+    needed = np.where(moves.pixels > 0, _needed(now, MARGIN * moves.variance, np.inf), 0.0)
+    guided = (needed >= WORTH) & (moves.pixels <= MOST_PIXELS)
+    if not guided.any():
+        return None
+    some = moves.on[guided[moves.line] & moves.open]
+    some = some[np.argsort(band.line[some], kind="stable")]
+    of_lines, line = np.unique(band.line[some], return_inverse=True)
+    _, group = np.unique(of_lines // GROUP, return_inverse=True)
+    heaviest = np.argsort(some)[np.searchsorted(np.sort(some), moves.first_pixel[of_lines])]
+    weights = tuple(move[some] for move in band.moves)
+    lines = GuidedPixels(band.pixels[some], band.keys[some], line, group.astype(np.int32), weights, heaviest)
+    cumulative, worth = learned_guide(paths, lines, [batch * max(band.place.shape) for batch in batches], run)
+    if not worth.any():
+        return None
+    some, group = some[worth[group][line]], group[line][worth[group][line]]
+    guided[of_lines[~worth[lines.group]]] = False
+    row, anew = np.full(len(band.pixels), -1, np.int32), np.zeros_like(film.done)
+    row[some], anew[some] = group, film.done[some]
+    film.forget(band.pixels[some])
+    moves.forget(guided)
+    return Guide(cumulative, row, SHARE), anew
 
 
 def _moments(film: PixelSamples, band: Band, threads: int | None) -> Float:

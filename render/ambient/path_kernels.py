@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
+from render.ambient.directions import guided_direction, guided_pdf
 from render.ambient.light_connection import Connection, connect_to_light, emission, light_beyond, light_sample
 from render.ambient.light_sampling import (
     KIND,
@@ -29,6 +30,7 @@ from render.ambient.light_sampling import (
 from render.ambient.path_state import EACH_SURFACE, FIRST_SURFACE, PathState, Samples, ShadowRays, accumulate
 from render.ambient.path_vertex import (
     Path,
+    beside_guide,
     eval_bsdf,
     eval_diffuse,
     fill_row,
@@ -36,7 +38,9 @@ from render.ambient.path_vertex import (
     local_direction,
     scatter,
     scatter_diffuse,
+    scattered_to,
     vertex_of,
+    with_guide,
 )
 from render.base.arrays import Float, Float32, Int
 from render.base.borrowed import borrowed
@@ -111,7 +115,8 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
         triangle, shadow_rays, film = borrowed(triangle), borrowed(shadow_rays), borrowed(film)
         vertices, triangles, materials = surface.vertices, surface.triangles, surface.rows
         rows, rectangles, environment = lights.rows, lights.rectangles, vector(lights.environment)
-        (table, seed, keys), (sums, counts), lamps = samples, film, lights.rows.shape[0]
+        (table, seed, keys, guide), (sums, counts), lamps = samples, film, lights.rows.shape[0]
+        cumulative, guide_row, share = guide
         origins, directions, throughputs, pdfs, pixel_slots, numbers, media, interiors = paths
         shadow_origins, shadow_directions, lengths, radiance, shadow_slots, shadow_interiors = shadow_rays
         depth, centre, epsilon = bounce.depth, vector(bounce.centre), bounce.ray_epsilon
@@ -176,9 +181,14 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
             albedo = vector(rho)
             place = minus(v.point, centre)
 
+            # the guide, of which nothing is to be had where light goes through
+            guided, from_guide = -1, False
+            if depth == 0 and guide_row.shape[0] > 0 and (diffuse or not (is_specular_row(row) or is_boundary(row))):
+                guided = guide_row[pixel_slot >> 1]
+
             # NEE
             light_choice, survival_number = 0.0, 0.0
-            if lamps > 1 or depth + 1 >= FIRST_ROULETTE_SURFACE:
+            if lamps > 1 or depth + 1 >= FIRST_ROULETTE_SURFACE or guided >= 0:
                 light_choice, survival_number = pair(table, seed, index, s, base + 3)
             if lamps > 0 and (diffuse or not is_specular_row(row)):
                 k, probability = sample_light(rows, v.point, light_choice)
@@ -194,6 +204,8 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
                             bsdf = eval_diffuse(v, albedo, drawn.direction)
                         else:
                             bsdf = eval_bsdf(v, row, albedo, frame, drawn.direction)
+                        if guided >= 0:
+                            bsdf = with_guide(bsdf, share, guided_pdf(cumulative, guided, drawn.direction))
                         light = connect_to_light(rows, rectangles, drawn, v, bsdf)
                         if light.brings:
                             origin = along(place, epsilon * light.side, v.normal)
@@ -202,12 +214,20 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
                             shadow_interiors[connected] = light.interior
                             connected += 1
 
-            # the path goes on as the BSDF is sampled
+            # the path goes on as the BSDF or the guide is sampled
             r1, r2 = pair(table, seed, index, s, base)
-            if diffuse:
+            if guided >= 0:
+                from_guide = survival_number < share  # no path may end so soon, which leaves this number over
+            if from_guide:
+                direction = guided_direction(cumulative, guided, r1, r2)
+                bsdf = eval_diffuse(v, albedo, direction) if diffuse else eval_bsdf(v, row, albedo, frame, direction)
+                on = scattered_to(v, direction, with_guide(bsdf, share, guided_pdf(cumulative, guided, direction)))
+            elif diffuse:
                 on = scatter_diffuse(v, albedo, r1, r2)
             else:
                 on = scatter(v, slot, row, albedo, frame, (choice, r1, r2), weight)
+            if guided >= 0 and not from_guide:
+                on = beside_guide(on, share, guided_pdf(cumulative, guided, on.direction))
             throughput, bsdf_pdf, medium = on.throughput, on.bsdf_pdf, on.medium
             if on.interior > 0:
                 medium = medium_within(materials, on.interior) + 1

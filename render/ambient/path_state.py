@@ -9,6 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.ambient.directions import Guide
 from render.base.arrays import Float, Float32, Int, Long
 from render.base.borrowed import borrowed
 from render.base.vectors import Vector, row_vector, store_row
@@ -66,6 +67,8 @@ class Samples(NamedTuple):
     seed: int
     keys: Int
     """(m,) for each pixel of the chunk the number that its random numbers follow from."""
+    guide: Guide
+    """Of the directions in which they leave their first surface."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

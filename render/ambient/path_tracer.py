@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from render.ambient.directions import Draws
 from render.ambient.light_sampling import Lights, pack_lights
 from render.ambient.path_kernels import Bounce, Film, shade_diffuse, shade_glossy
 from render.ambient.path_state import PathState, Samples, ShadowRays, accumulate_unoccluded, camera_rays
@@ -27,6 +28,23 @@ WAVEFRONT = 1 << 15
 """Most paths that go together: their states stay in the cache, and a room full of mirrors is left in time when
 cancelled. Chosen, not tuned."""
 UNBOUNDED = 1 << 30
+
+
+class FirstWays:
+    """Where the paths of a wavefront, each with a slot of its own, go from their first surface."""
+
+    def __init__(self, slots: int) -> None:
+        self.direction = np.zeros((slots, 3), np.float32)
+        self.pdf = np.zeros(slots, np.float32)
+        """1/sr; as in `PathState`, and 0 where a path ends."""
+        self.before = np.zeros(slots)
+        """The sum over R, G, B of what they have seen so far."""
+
+    def take(self, paths: PathState, n: int, sums: Float) -> None:
+        """Of the first n paths, and what all have added to sums (slots, 4)."""
+        slots = paths.pixel_slot[:n]
+        self.direction[slots], self.pdf[slots] = paths.direction[:n], paths.bsdf_pdf[:n]
+        self.before[:] = sums[:, :3].sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -53,20 +71,21 @@ class CameraPaths:
         pixels: Int,
         first: Int,
         count: Int,
-        sums: Float,
-        counts: Float,
+        film: Film,
         cancelled: Cancel | None,
-        keys: Int | None = None,
+        draws: Draws | None = None,
+        ways: FirstWays | None = None,
     ) -> None:
         """Samples first .. first + count, (m, 2) for both halves, of the pixels (m,), at most WAVEFRONT in all.
 
-        Their radiance is added to sums and counts as in `Film`. keys: the numbers (m,) that their random numbers follow
-        from, in place of those of the pixels. Raises Cancelled.
+        What they see is added to the film. draws: in place of numbers that follow from the pixels, and no guide; ways:
+        filled where there is one sample of each half. Raises Cancelled.
         """
         paths, shadow_rays = self._arrays()
         rays, glossy, media = self.rays, has_gloss(self.surface), has_medium(self.surface)
         shade = shade_glossy if glossy else shade_diffuse
-        samples, film = Samples(pair_table(), self.seed, pixels if keys is None else keys), Film(sums, counts)
+        keys, guide = Draws(pixels) if draws is None else draws
+        samples, (sums, counts) = Samples(pair_table(), self.seed, keys, guide), film
         n = camera_rays(self.view, samples, pixels, first, count, rays.centre, paths)
         nested = has_overlaps(self.surface)
         paths.interior[:n] = self.interior
@@ -93,6 +112,8 @@ class CameraPaths:
                 else:
                     blocked = rays.occluded(*ends, coherent=side_by_side)
                 accumulate_unoccluded(shadow_rays, blocked, self.clamp if depth > 0 else np.inf, sums, counts)
+            if ways is not None and depth == 0:
+                ways.take(paths, n, sums)
             depth += 1
 
     def _walk(

@@ -168,6 +168,33 @@ def scatter(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def with_guide(bsdf: BsdfValue, share: float, guide_pdf: float) -> BsdfValue:
+    """A BSDF towards a direction, where a share of the directions is drawn with another pdf, 1/sr."""
+    return BsdfValue(bsdf.f, bsdf.cosine, (1.0 - share) * bsdf.pdf + share * guide_pdf, bsdf.interior)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def scattered_to(v: Vertex, direction: Vector, bsdf: BsdfValue) -> Continued:
+    """How a path goes on in a direction that was drawn with the pdf of its value."""
+    side = 1.0 if dot(v.normal, direction) > 0.0 else -1.0
+    if not bsdf.cosine > 0.0:
+        return Continued(direction, (0.0, 0.0, 0.0), 0.0, side, bsdf.interior, 0)
+    throughput = scaled(bsdf.cosine / bsdf.pdf, times(v.throughput, bsdf.f))
+    return Continued(direction, throughput, bsdf.pdf, side, bsdf.interior, 0)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def beside_guide(on: Continued, share: float, guide_pdf: float) -> Continued:
+    """How a path goes on as its BSDF was sampled, where a share of the directions is drawn with another pdf, 1/sr."""
+    pdf = (1.0 - share) * on.bsdf_pdf + share * guide_pdf
+    factor = on.bsdf_pdf / pdf
+    if on.bsdf_pdf <= 0.0:
+        # nothing else leads to a single direction
+        pdf, factor = on.bsdf_pdf, 1.0 / (1.0 - share)
+    return Continued(on.direction, scaled(factor, on.throughput), pdf, on.side, on.interior, on.medium)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def cosine_direction(r1: float, r2: float, normal: Vector) -> tuple[Vector, float]:
     """A cosine-distributed direction about a unit normal, by Duff et al. 2017, and its cosine."""
     n0, n1, n2 = normal

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from render.ambient.directions import Draws
+from render.ambient.path_kernels import Film
 from render.ambient.path_state import CLAMPED_RADIANCE
 from render.ambient.path_tracer import WAVEFRONT, CameraPaths
 from render.base.arrays import Float, Float32, Int, Long
@@ -47,26 +49,30 @@ class PixelSamples:
         """(n,) where some pixels are among all."""
         return np.searchsorted(self.pixels, pixels)
 
+    def forget(self, pixels: Int) -> None:
+        """Leave out all samples of some pixels so far."""
+        place = self.place(pixels)
+        self.sums[place], self.spread[place], self.done[place] = 0.0, 0.0, 0
+
     def means(self, pixels: Int | None = None) -> Float32:
         """(n, 2, 3) radiance of both halves of some pixels, or of all; each half must have samples."""
         some = slice(None) if pixels is None else self.place(pixels)
         return np.asarray(self.sums[some] / self.done[some][..., None], dtype=np.float32)
 
-    def add(self, paths: CameraPaths, pixels: Int, count: Int | Float, run: Run, keys: Int | None = None) -> None:
+    def add(self, paths: CameraPaths, pixels: Int, count: Int | Float, run: Run, draws: Draws | None = None) -> None:
         """Samples until each of some pixels (n,), all different, has count (n, 2) of both halves. Raises Cancelled.
 
-        keys: as for `CameraPaths.add`.
+        draws: as for `CameraPaths.add`.
         """
-        place = self.place(pixels)
+        place, draws = self.place(pixels), Draws(pixels) if draws is None else draws
         while True:
             more = np.clip(count - self.done[place], 0, ROUND).astype(np.int32)
             wanting = np.flatnonzero(more.any(axis=1))
             if not len(wanting):
                 return
-            keyed = pixels if keys is None else keys
-            self._add_round(paths, place[wanting], keyed[wanting], more[wanting], run)
+            self._add_round(paths, place[wanting], draws.of(wanting), more[wanting], run)
 
-    def _add_round(self, paths: CameraPaths, place: Long, keys: Int, more: Int, run: Run) -> None:
+    def _add_round(self, paths: CameraPaths, place: Long, draws: Draws, more: Int, run: Run) -> None:
         rays = more.sum(axis=1, dtype=np.int64)
         chunk = (np.cumsum(rays) - rays) // (WAVEFRONT - 2 * ROUND)
         edges = np.append(np.flatnonzero(np.diff(chunk, prepend=-1)), len(place))
@@ -75,16 +81,18 @@ class PixelSamples:
         def work(start: int, stop: int) -> None:
             for i in range(start, stop):
                 some = slice(edges[i], edges[i + 1])
-                cut[i] = self._trace(paths, place[some], keys[some], more[some], counts[i], run)
+                cut[i] = self._trace(paths, place[some], draws.of(some), more[some], counts[i], run)
 
         run.map(work, len(edges) - 1, 1)
         # in the order of the chunks, whichever thread was first
         self.invalid_counts += counts.sum(axis=0)
         self.cut += float(cut.sum())
 
-    def _trace(self, paths: CameraPaths, place: Long, keys: Int, more: Int, invalid_counts: Float, run: Run) -> float:
+    def _trace(
+        self, paths: CameraPaths, place: Long, draws: Draws, more: Int, invalid_counts: Float, run: Run
+    ) -> float:
         sums, first = np.zeros((2 * len(place), 4)), self.done[place]
-        paths.add(self.pixels[place], first, more, sums, invalid_counts, run.cancelled, keys)
+        paths.add(self.pixels[place], first, more, Film(sums, invalid_counts), run.cancelled, draws)
         new, old = sums.reshape(-1, 2, 4)[..., :3].astype(np.float32), self.sums[place]
         before, added = np.maximum(first, 1)[..., None], np.maximum(more, 1)[..., None]
         variance = (old / before - new / added) ** 2 / (1.0 / before + 1.0 / added)

@@ -41,7 +41,7 @@ def random_walk_step(
     """
     walking, distance, rows, samples = borrowed(walking), borrowed(distance), borrowed(rows), borrowed(samples)
     paths, triangle = borrowed(paths), borrowed(triangle)
-    _, seed, keys = samples
+    seed, keys = samples.seed, samples.keys
     left = 0
     d, w, extinction, pdf = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for place in range(walking.shape[0]):

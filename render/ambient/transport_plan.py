@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from render.ambient.directions import Draws
+from render.ambient.path_kernels import Film
 from render.ambient.path_tracer import camera_paths
 from render.ambient.pixel_samples import PixelSamples
 from render.base.arrays import Int
@@ -91,7 +93,7 @@ def onward_share(placed: PlacedScene, most: int | None = None, run: Run = Run())
         total = np.zeros((2 * len(draw), 4))
         first = np.zeros((len(draw), 2), np.int32)
         count = np.full_like(first, PIXEL_SAMPLES)
-        paths.add(draw.astype(np.int32), first, count, total, np.zeros(2), run.cancelled)
+        paths.add(draw.astype(np.int32), first, count, Film(total, np.zeros(2)), run.cancelled)
         sums.append(total[:, :3].reshape(GROUPS, -1).sum(axis=1))
     seen, once, all_of_it = sums
     known, onward = once - seen, np.maximum(all_of_it - once, 0.0)
@@ -124,7 +126,7 @@ def onward_effect(placed: PlacedScene, importance: Importance, most: int | None 
         for surfaces in (1, most):
             film = PixelSamples(pixels)
             paths = camera_paths(placed.world, placed.scene, view, surfaces=surfaces, seed=own)
-            film.add(paths, pixels, np.full((len(pixels), 2), EFFECT_SAMPLES, np.int32), quiet, keys)
+            film.add(paths, pixels, np.full((len(pixels), 2), EFFECT_SAMPLES, np.int32), quiet, Draws(keys))
             light.append(film.means())
         onward = (light[1] - light[0]) * move.ravel()[pixels, None, None]
         moved = np.array([np.bincount(keys, part) for part in onward.reshape(len(pixels), -1).T]).reshape(2, 3, -1)

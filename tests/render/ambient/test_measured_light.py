@@ -10,6 +10,7 @@ import pytest
 from scipy.ndimage import maximum_filter
 
 from render.ambient.coarse_image import COARSE_ERROR, CoarseImage, coarse_image
+from render.ambient.directions import Draws
 from render.ambient.guided_image import places_of
 from render.ambient.guided_interpolation import SEEN, grid_of, interpolate, smooth_grid
 from render.ambient.integrator import ambient_images
@@ -128,18 +129,18 @@ def moved_lines(shared=True, scale=0.05, seeds=SEEDS):
         found.append(moves(film.means(band.pixels).mean(axis=1)))
         samples.append(film.total)
     film = PixelSamples(band.pixels)
-    film.add(paths_of(placed, 99), band.pixels, np.full((len(band.pixels), 2), 64, np.int32), Run(), band.keys)
+    film.add(paths_of(placed, 99), band.pixels, np.full((len(band.pixels), 2), 64, np.int32), Run(), Draws(band.keys))
     halves = [moves(half) for half in np.swapaxes(film.means(band.pixels).astype(np.float64), 0, 1)]
     return np.array(found), np.array(halves), np.array(told), np.mean(samples)
 
 
 @pytest.mark.validation
 def test_lines_are_moved_by_no_more_than_is_allowed_and_told():
-    found, _, told, _ = moved_lines()
+    found, _, told, _ = moved_lines(seeds=2 * SEEDS)
     # in the colour that is known worst
     deviation = found.std(axis=0, ddof=1).max(axis=0)
     assert np.mean(deviation <= 1.0) >= 0.95
-    # of 30 seeds a deviation is known to 13 %, the largest of three colours, and the quantile of some 150 lines
+    # of 60 seeds a deviation is known to 9 %, the largest of three colours, and the quantile of some 150 lines
     assert np.quantile(deviation, 0.95) == pytest.approx(np.mean(np.quantile(told, 0.95, axis=1)), rel=0.3)
     assert np.sqrt(np.mean(deviation**2)) == pytest.approx(np.sqrt(np.mean(told**2)), rel=0.15)
 
