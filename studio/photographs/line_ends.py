@@ -145,9 +145,7 @@ def _past(found: _Found) -> NDArray[np.bool_]:
     """Which of a line's scan lines (m,) are past an end of one of its pieces, or on a short piece unlike the next."""
     rows, width = found.rows, found.width
     past = np.zeros(len(rows), np.bool_)
-    narrower = np.minimum(width[1:], width[:-1])
-    splits = np.flatnonzero((np.diff(rows) > NEXT) | (np.abs(np.diff(found.u)) > JUMP * np.maximum(narrower, 1.0))) + 1
-    pieces = [piece for piece in np.split(np.arange(len(rows)), splits) if len(piece)]
+    pieces = pieces_of(rows, found.u, width)
     long = np.concatenate([piece for piece in pieces if len(piece) > 2 * NEXT] or [np.zeros(0, np.intp)])
     for piece in pieces:
         if len(piece) > 2 * NEXT:
@@ -160,6 +158,13 @@ def _past(found: _Found) -> NDArray[np.bool_]:
             seen = float(np.median(width[piece])), float(np.median(found.amplitude[piece]))
             past[piece] = not alike(*seen, width[nearest], found.usual(nearest))
     return past
+
+
+def pieces_of(rows: NDArray[np.intp], u: Floats, width: Floats) -> list[NDArray[np.intp]]:
+    """Scan lines, positions and widths (m,) of a line -> the indices of each of its pieces."""
+    narrower = np.minimum(width[1:], width[:-1])
+    splits = np.flatnonzero((np.diff(rows) > NEXT) | (np.abs(np.diff(u)) > JUMP * np.maximum(narrower, 1.0))) + 1
+    return [piece for piece in np.split(np.arange(len(rows)), splits) if len(piece)]
 
 
 def _first(found: _Found, inward: NDArray[np.intp]) -> int:
