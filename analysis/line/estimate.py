@@ -20,6 +20,7 @@ from analysis.line.ground_noise import ground_noise
 from analysis.line.measure import measure
 from analysis.line.mosaic import seen_only, seen_rows, some_runs
 from analysis.line.residuals import RUN, scatter
+from analysis.line.response_spread import response_spread
 from analysis.line.result import Flag, Line
 from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float
@@ -118,7 +119,8 @@ def estimate_noise(
     noise, line = _told_by_neighbours(lines, noise, fitted)
     # a photograph in colour is demosaiced, one that was processed smoothed, whatever its background tells
     alike = processed or image.ndim == 3 or lines.seen is not None or _alike(lines, noise, line)
-    return noise.model_copy(update={"alike": alike, "filled_in": lines.seen is not None})
+    spread = response_spread(replace(lines, noise=noise)) if alike and lines.seen is None else 1.0
+    return noise.model_copy(update={"alike": alike, "filled_in": lines.seen is not None, "spread": spread})
 
 
 def _told_by_ground(

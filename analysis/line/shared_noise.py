@@ -6,13 +6,14 @@ themselves tell it. Over a run of scan lines a surface is smooth, here a cubic, 
 
     r = R e,   R = 1 - P (P' P)^-1 P',   E[r r'] = sum over lags k of c_k R T_k R'
 
-with e the errors in sigmas, P the cubic and T_k ones on the k-th diagonals, gives moments of r that are linear in the
-covariances c_k. These are weighted as normal likelihood weighs white errors (C. R. Rao, J. Multivariate Analysis 1,
-445, 1971). c_0 is what sigma's square would have to be multiplied with, 1 + 2 (c_1 + c_2 ...) / c_0 how many scan
-lines err alike. What c_0 is above 1 is parted, by non-negative least squares over the scan lines, into a share of
-sigma's square and a variance of its own. Where it is below 1 on scan lines of one kind, as of those that no fit
-follows, whose sigma holds what that may cost at most, their sigma is as much smaller. Shape finer than a run counts as
-noise: of a sensor whose pixels are independent a rough surface is told, and nothing is asked here.
+with e the errors in sigmas, P the cubic over sigma and T_k ones on the k-th diagonals, gives moments of r that are
+linear in the covariances c_k, of as few lags as explain them. These are weighted as normal likelihood weighs white
+errors (C. R. Rao, J. Multivariate Analysis 1, 445, 1971). c_0 is what sigma's square would have to be multiplied with,
+1 + 2 (c_1 + c_2 ...) / c_0 how many scan lines err alike. What c_0 is above 1 is parted, by non-negative least squares
+over the scan lines, into a share of sigma's square and a variance of its own. Where it is below 1 on scan lines of one
+kind, as of those that no fit follows, whose sigma holds what that may cost at most, their sigma is as much smaller.
+Shape finer than a run counts as noise: of a sensor whose pixels are independent a rough surface is told, and nothing is
+asked here.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ DEGREE = 3
 LAGS = 4
 """Runs are so many times as long as the distances that are told apart."""
 STRAY = 4.0
-"""Robust standard deviations from its run's cubic at which a position is a stray."""
+"""Robust standard deviations from its run's cubic at which a position is a stray, in px and in its own sigmas."""
 EDGE, JUMP = 3.0, 1.0
 """Times the median variance from which a run shows an edge; so does a scatter of so many widths of the line."""
 FINEST = 1.1
@@ -53,6 +54,8 @@ KINDS = (SINGLE, (Flag.SATURATED,), (Flag.BLENDED,), (Flag.MISFIT,))
 SURE, KNOWN = 3.0, 0.2
 """Standard errors from which a variance is believed to be another than the one told, and how well that is known at
 best."""
+LIKELY = 1.0
+"""Standard errors by which errors at a distance have to be alike to be told so."""
 LEAST = 0.01
 """Of the variance told, in one of two rounds."""
 
@@ -84,36 +87,50 @@ def with_shared_noise(line: Line) -> Line:
     narrow = valid.any() and float(np.median(line.width[valid, 0])) < FINEST
     coarse = (line.flag == Flag.OK) & ((line.width < FINEST) | narrow)
     line = replace(line, flag=np.where(coarse, Flag.UNRESOLVED, line.flag).astype(line.flag.dtype))
-    line = _no_less_sure(line)
+    line, found = _no_less_sure(line)
     asked = single if single.sum() >= MOST * valid.sum() else valid
-    noise = shared_noise(np.where(asked, line.u[:, 0], np.nan), line.sigma_u[:, 0], line.width[:, 0])
+    if (asked != valid).any():
+        found = _covariance(np.where(asked, line.u[:, 0], np.nan), line.sigma_u[:, 0], line.width[:, 0])
+    noise = None if found is None else _beyond(found)
     if noise is None:
         return line
     candidates = None if line.candidates is None else noise.added_to(line.candidates)
     return replace(noise.added_to(line), candidates=candidates)
 
 
-def _no_less_sure(line: Line) -> Line:
-    """The line (n, k) with smaller sigmas on those `KINDS` of scan lines whose first peaks surely scatter by less."""
+def _no_less_sure(line: Line) -> tuple[Line, _Covariance | None]:
+    """The line (n, k) with smaller sigmas on those `KINDS` of scan lines whose first peaks surely scatter by less, and
+    what its positions' errors are by these."""
     sigma, flag = line.sigma_u.copy(), line.flag[:, 0]
+    u = np.where(line.valid[:, 0], line.u[:, 0], np.nan)
+    found = _covariance(u, sigma[:, 0], line.width[:, 0])
     for _ in range(2):  # runs are weighted by sigma
-        found = _covariance(np.where(line.valid[:, 0], line.u[:, 0], np.nan), sigma[:, 0], line.width[:, 0])
-        if found is None:
+        smaller = [] if found is None else _smaller(found, flag)
+        if not smaller:
             break
-        runs, covariance, length = found.runs, found.covariance, found.length
-        rows, squares = (np.concatenate([getattr(run, name) for run in runs]) for name in ("rows", "squares"))
-        # degrees of freedom, and what errs alike, are missing from all squares alike
-        squares = squares * (covariance[0] / squares.mean())
-        for kind in KINDS:
-            here = squares[np.isin(flag[rows], kind)]
-            error = math.sqrt(2.0 * length / max(len(here), 1))
-            if len(here) >= FEWEST_RUNS * RUNS[0] / 2 and here.mean() * (1.0 + SURE * error) + KNOWN < 1.0:
-                sigma[np.isin(line.flag, kind)] *= math.sqrt(max(float(here.mean()), LEAST))
+        for kind, ratio in smaller:
+            sigma[np.isin(line.flag, kind)] *= ratio
+        found = _covariance(u, sigma[:, 0], line.width[:, 0])
     if not (sigma < line.sigma_u).any():
-        return line
+        return line, found
     # what neighbours share has to stay a part of it
     less = np.where(sigma < line.sigma_u, sigma / line.sigma_u, 1.0)
-    return replace(line, sigma_u=sigma, shared_u=None if line.shared_u is None else line.shared_u * less)
+    shared = None if line.shared_u is None else line.shared_u * less
+    return replace(line, sigma_u=sigma, shared_u=shared), found
+
+
+def _smaller(found: _Covariance, flag: NDArray[np.uint8]) -> list[tuple[tuple[Flag, ...], float]]:
+    """Of the flags (n,) of scan lines those `KINDS` whose sigma is surely too large, and what to multiply it with."""
+    rows, squares = (np.concatenate([getattr(run, name) for run in found.runs]) for name in ("rows", "squares"))
+    # degrees of freedom, and what errs alike, are missing from all squares alike
+    squares = squares * (found.covariance[0] / squares.mean())
+    out: list[tuple[tuple[Flag, ...], float]] = []
+    for kind in KINDS:
+        here = squares[np.isin(flag[rows], kind)]
+        error = math.sqrt(2.0 * found.length / max(len(here), 1))
+        if len(here) >= FEWEST_RUNS * RUNS[0] / 2 and here.mean() * (1.0 + SURE * error) + KNOWN < 1.0:
+            out.append((kind, math.sqrt(max(float(here.mean()), LEAST))))
+    return out
 
 
 def shared_noise(u: Float, sigma: Float, width: Float) -> SharedNoise | None:
@@ -122,11 +139,13 @@ def shared_noise(u: Float, sigma: Float, width: Float) -> SharedNoise | None:
     None: as they tell and independently, as far as can be sure, or too few positions.
     """
     found = _covariance(u, sigma, width)
-    if found is None:
-        return None
+    return None if found is None else _beyond(found)
+
+
+def _beyond(found: _Covariance) -> SharedNoise | None:
     variance = max(float(found.covariance[0]), 1e-300)
     more = variance - 1.0 > SURE * found.error + KNOWN
-    if not (more or found.covariance[1] > SURE * found.error * max(variance, 1.0)):
+    if not (more or found.covariance[1:2].sum() > SURE * found.error * max(variance, 1.0)):
         return None
     share, added = _parted(found.runs, variance - 1.0) if more else (0.0, 0.0)
     return SharedNoise(share, added, found.length)
@@ -164,9 +183,25 @@ def _covariance(u: Float, sigma: Float, width: Float) -> _Covariance | None:
         return None
     moments = np.sum([run.moments for run in runs], axis=0)
     design = np.sum([run.design for run in runs], axis=0)
-    covariance = np.linalg.lstsq(design, moments, rcond=1e-9)[0]
+    covariance = _shortest(moments, design)
     # of white errors: twice the squared mean over the degrees of freedom
     return _Covariance(runs, covariance, float(np.sqrt(2.0 / design[0, 0])))
+
+
+def _shortest(moments: Float, design: Float) -> Float:
+    """(m,) covariances at as few distances as leave none of the next one's moment (lags,) unexplained, by chance.
+
+    All distances that fit into a run are too many: what errs alike over all of it is the cubic's, so that one unknown
+    more or less for each shifts all of them together.
+    """
+    for count in range(1, len(moments)):
+        found = np.linalg.solve(design[:count, :count], moments[:count])
+        alike = found / max(float(found[0]), 1e-300)
+        # of products of normal errors that are alike (Bartlett, J. Royal Statist. Soc. Suppl. 8, 27, 1946)
+        scatter = max(float(found[0]), 0.0) * math.sqrt(2.0 * design[count, count] * (2.0 * float(alike @ alike) - 1.0))
+        if moments[count] - design[count, :count] @ found <= LIKELY * scatter:
+            return np.asarray(found)
+    return np.asarray(np.linalg.lstsq(design, moments, rcond=1e-9)[0])
 
 
 def _parted(runs: list[_Run], excess: float) -> tuple[float, float]:
@@ -214,30 +249,44 @@ def _run(u: Float, sigma: Float, width: Float, start: int) -> _Run | None:
     if there.sum() < FILLED * len(u):
         return None
     rest = _residual_maker(np.flatnonzero(there).tobytes(), len(u)) @ u[there]
-    scale = 1.4826 * np.median(np.abs(rest))
-    there[there] = np.abs(rest) <= STRAY * scale
-    if there.sum() < FILLED * len(u) or scale > JUMP * np.median(width[there]):
+    scale, own = (1.4826 * _median(np.abs(one)) for one in (rest, rest / sigma[there]))
+    there[there] = (np.abs(rest) <= STRAY * scale) | (np.abs(rest) <= STRAY * own * sigma[there])
+    if there.sum() < FILLED * len(u) or scale > JUMP * _median(width[there]):
         return None
-    at = np.flatnonzero(there).tobytes()
-    scaled = _residual_maker(at, len(u)) @ u[there] / sigma[there]
-    lags, design = _lags(at, len(u))
-    return _Run(
-        lags @ np.outer(scaled, scaled).ravel(), design, scaled**2, sigma[there] ** -2, start + np.flatnonzero(there)
-    )
+    rows, told = np.flatnonzero(there), sigma[there]
+    # a cubic by the positions that know it best: by all alike, the noise of a few would be in the rest of all
+    basis = np.linalg.qr(_powers(rows, len(u)) / told[:, None])[0]
+    scaled = u[there] / told
+    scaled = scaled - basis @ (basis.T @ scaled)
+    lags = _lags(rows.tobytes(), len(u))
+    sides = lags @ basis
+    squares, inner = sides.reshape(len(lags), -1), (basis.T @ sides).reshape(len(lags), -1)
+    # sums over R T_j R o T_k of R = 1 - Q Q', Q the cubic's basis
+    design = np.diag(lags.sum(axis=(1, 2))) - 2.0 * squares @ squares.T + inner @ inner.T
+    return _Run((lags @ scaled) @ scaled, design, scaled**2, told**-2, start + rows)
+
+
+def _median(values: Float) -> float:
+    """Of a few values (n,), as `np.median`, which takes ten times as long for a run."""
+    ordered = np.sort(values)
+    return 0.5 * float(ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
 
 
 @lru_cache(maxsize=8)
-def _lags(at: bytes, length: int) -> tuple[Float, Float]:
-    """(lags, n n) pairs of the scan lines of a run that are so far apart, and (lags, lags) as `_Run.design` says."""
-    left, places = _residual_maker(at, length), np.frombuffer(at, np.intp)
+def _lags(at: bytes, length: int) -> Float:
+    """(lags, n, n) pairs of the scan lines `at`, bytes of (n,), of a run that are so far apart."""
+    places = np.frombuffer(at, np.intp)
     apart = np.abs(places[:, None] - places[None, :])
-    lags = np.stack([apart == k for k in range(length // LAGS)]).astype(np.float64)
-    flat = lags.reshape(len(lags), -1)
-    return flat, flat @ (left @ lags @ left).reshape(len(lags), -1).T
+    return np.stack([apart == k for k in range(length // LAGS)]).astype(np.float64)
 
 
 @lru_cache(maxsize=8)
 def _residual_maker(at: bytes, length: int) -> Float:
     """(n, n) that takes the cubic out of positions on the scan lines `at`, bytes of (n,), of a run; most are alike."""
-    powers = np.vander(np.frombuffer(at, np.intp) / length - 0.5, DEGREE + 1)
+    powers = _powers(np.frombuffer(at, np.intp), length)
     return np.asarray(np.eye(len(powers)) - powers @ np.linalg.pinv(powers))
+
+
+def _powers(rows: NDArray[np.intp], length: int) -> Float:
+    """(n, DEGREE + 1) of scan lines (n,) of a run."""
+    return np.vander(rows / length - 0.5, DEGREE + 1)

@@ -14,12 +14,14 @@ from render.base.files import atomic_write
 from studio.photographs.photographs import Measured
 
 SMALLEST, LARGEST = 900, 1800
-"""px of the picture's longer side: small images are enlarged by a whole factor, large ones shrunk."""
+"""px of the picture's longer side, between which an image keeps its size: smaller ones are enlarged by a whole factor,
+larger ones shrunk."""
 BAR = 10.0
 """Times sigma: one sigma is far less than a pixel."""
 EDGE = 10
 """px beside the image, where scan lines without a point have their mark."""
-LEGEND = 26
+LEGEND, LEGEND_WIDTH = 26, 700
+"""px of its height, and of a picture that it is as large as it has to be for; in wider ones it grows with them."""
 GOOD, DOUBTFUL, LOST, NOTHING, INK = (0, 230, 0), (0, 190, 255), (60, 60, 255), (70, 70, 70), (235, 235, 235)
 """B, G, R."""
 
@@ -53,7 +55,7 @@ def _brightened(image: NDArray[Any]) -> tuple[NDArray[np.uint8], float]:
     high = max(high, low + 1e-6 * max(abs(low), 1.0), low + 0.2 * (float(values.max()) - low))
     shown = (255.0 * np.clip((values - low) / (high - low), 0.0, 1.0) ** 0.6).astype(np.uint8)
     side = max(image.shape[:2])
-    scale = LARGEST / side if side > LARGEST else float(max(1, SMALLEST // side))
+    scale = LARGEST / side if side > LARGEST else float(max(1, -(-SMALLEST // side)))
     size = (round(image.shape[1] * scale), round(image.shape[0] * scale))
     how = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_NEAREST
     return np.ascontiguousarray(cv2.resize(shown, size, interpolation=how)), scale
@@ -71,18 +73,20 @@ def _with_legend(canvas: NDArray[np.uint8], line: Line, scale: float) -> NDArray
     marks[lost[at] & ~nothing[at]] = LOST
     marks[:, :2] = 0
     canvas = np.hstack([canvas, marks]) if rows else np.vstack([canvas, marks.transpose(1, 0, 2)])
-    legend = np.zeros((LEGEND, canvas.shape[1], 3), np.uint8)
-    what = "rows" if rows else "columns"
-    x = 8
+    large = max(canvas.shape[1] / LEGEND_WIDTH, 1.0)
+    middle, box, size, thick = (round(values * large) for values in (0.5 * LEGEND, 10, 100, 0.75))
+    legend = np.zeros((2 * middle, canvas.shape[1], 3), np.uint8)
+    what, x = "rows" if rows else "columns", round(8 * large)
     for colour, text in (
         (GOOD, f"line, bar {BAR:g} sigma"),
         (DOUBTFUL, "with a flag"),
         (LOST, f"{what} rejected"),
         (NOTHING, f"{what} without a line"),
     ):
-        cv2.rectangle(legend, (x, 8), (x + 10, 18), colour, -1)
-        cv2.putText(legend, text, (x + 15, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.42, INK, 1, cv2.LINE_AA)
-        x += 28 + cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.42, 1)[0][0]
+        font = cv2.FONT_HERSHEY_SIMPLEX, 0.0042 * size
+        cv2.rectangle(legend, (x, middle - box // 2), (x + box, middle + box // 2), colour, -1)
+        cv2.putText(legend, text, (x + 3 * box // 2, middle + box // 2), *font, INK, max(thick, 1), cv2.LINE_AA)
+        x += 3 * box + cv2.getTextSize(text, *font, max(thick, 1))[0][0]
     return np.vstack([canvas, legend])
 
 

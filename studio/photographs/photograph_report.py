@@ -33,8 +33,8 @@ PICTURES, CURVES = 4, 6
 """Photographs that are shown; the first and the last are."""
 PICTURE_SIDE = 1100
 """px"""
-UNTRUE = 1.3
-"""Residual over sigma above which a remark says so."""
+UNTRUE, UNFIT = 1.3, 0.05
+"""Residual over sigma, and share of strays, above which a remark says so."""
 COLUMNS = (
     "found",
     "coverage",
@@ -165,7 +165,7 @@ def _content(
         "facts": f"{len(lines)} photograph{'s' if len(lines) > 1 else ''} · no truth: nothing here is an error",
         "headline": f"{count(found)} points on {percent(found / max(total, 1))} of the {axis}.{fitted}",
         "tiles": tiles,
-        "remarks": [*report.look.warnings, *_remarks(report, known)] or ["Nothing unusual."],
+        "remarks": [*report.look.warnings, *_remarks(report, singles, whole)] or ["Nothing unusual."],
         "chosen": report.look.told,
         "columns": COLUMNS,
         "rows": [_row(report, k, single) for k, single in enumerate(singles)],
@@ -180,14 +180,27 @@ def _content(
     }
 
 
-def _remarks(report: PhotographReport, known: Sequence[tuple[Fit, float]]) -> list[str]:
+def _remarks(
+    report: PhotographReport, singles: Sequence[tuple[Fit, float] | None], whole: tuple[Fit, float] | None
+) -> list[str]:
     found = []
-    ratios = [ratio for _, ratio in known if np.isfinite(ratio)]
+    ratios = [one[1] for one in singles if one is not None and np.isfinite(one[1])]
     if ratios and np.median(ratios) > UNTRUE:
         found.append(
             f"The points lie {np.median(ratios):.1f} times farther from the fitted {_names(report)[0]} than their "
             "sigmas say: the surface is not of that shape, the calibration bends it, or the noise of the image is "
             "underestimated."
+        )
+    if whole is not None and whole[1] > UNTRUE:
+        found.append(
+            f"All photographs together lie {whole[1]:.3g} times farther from one {_names(report)[1]} than their sigmas "
+            "say: the part is not of that shape, or did not move as the project says."
+        )
+    shares = [one[0].strays for one in singles if one is not None]
+    if shares and np.median(shares) > UNFIT:
+        found.append(
+            f"{percent(float(np.median(shares)))} of the points of a photograph lie beside its {_names(report)[0]}: "
+            "what is told of the residuals is told of the others alone."
         )
     for name, one in zip(report.names, report.measured, strict=True):
         line = one.line

@@ -40,7 +40,7 @@ from studio.photographs.line_arrays import changed, column
 from studio.photographs.line_ends import Tone, ended
 from studio.photographs.mosaic import with_mosaic
 from studio.photographs.photograph_set import NEARBY, Look
-from studio.photographs.pieces import NO_LINE, lines_only
+from studio.photographs.pieces import NO_LINE, above_noise, lines_only
 from studio.photographs.second_look import looked_at_again
 from studio.scan.line_extraction import note_of
 
@@ -177,7 +177,7 @@ def _measured(
     elif not alone:
         line = selected(line, settings, volume)
     if settings.select == "continuous":
-        found = ended(line, tone)
+        found = above_noise(ended(line, tone), noise, settings.threshold)
         line = lines_only(found)
         if found.valid.any() and not line.valid.any():
             return Measured(no_line(whole.shape, settings, NO_LINE), whole, light.image, corner, noise)

@@ -9,8 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.line.detection.matched_filter import FILTER_SIGMA, NOISE_GAIN
+from analysis.line.detection.noise import NoiseModel
 from analysis.line.result import Flag, Line
 from studio.photographs.line_arrays import changed
+from studio.photographs.line_ends import pieces_of
 
 LONG, SMALL = 24, 8
 """Scan lines of a piece that no edge makes by chance; in a small image an eighth or so of them."""
@@ -25,6 +28,10 @@ def lines_only(line: Line) -> Line:
     """The line (n, k) without those ranks that are scattered pieces of nothing (flag REJECTED); `note` tells."""
     scattered = np.array([_scattered(line, k) for k in range(line.u.shape[1])], np.bool_)
     gone = line.valid & scattered
+    return _without(line, gone)
+
+
+def _without(line: Line, gone: NDArray[np.bool_]) -> Line:
     if not gone.any():
         return line
 
@@ -32,6 +39,26 @@ def lines_only(line: Line) -> Line:
         return np.where(gone, np.nan, values)
 
     return changed(line, kept, np.where(gone, np.uint8(Flag.REJECTED), line.flag).astype(np.uint8))
+
+
+def above_noise(line: Line, noise: NoiseModel, threshold: float) -> Line:
+    """The line (n, k) without those of its pieces that rise above the noise as pixels that share none would have it,
+    and not above what they share makes of it (flag REJECTED). threshold: of the detection, standard deviations.
+
+    A JPEG makes stripes as long as its blocks, and two that happen to meet are a chain. Single scan lines that are as
+    faint belong to the line where it goes on.
+    """
+    if noise.spread <= 1.0:
+        return line
+    gone = np.zeros(line.u.shape, np.bool_)
+    for k in range(line.u.shape[1]):
+        rows = np.flatnonzero(line.valid[:, k])
+        height = line.amplitude[rows, k] / np.hypot(1.0, FILTER_SIGMA / line.width[rows, k])
+        response = height / np.sqrt(NOISE_GAIN * (np.maximum(line.background[rows, k], 0.0) + noise.floor))
+        for piece in pieces_of(rows, line.u[rows, k], line.width[rows, k]):
+            if np.median(response[piece]) < noise.spread * threshold:
+                gone[rows[piece], k] = True
+    return _without(line, gone)
 
 
 def _scattered(line: Line, k: int) -> bool:

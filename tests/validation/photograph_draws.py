@@ -108,7 +108,7 @@ if __name__ == "__main__":
     parser.add_argument("--draws", type=int, default=40)
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("names", nargs="*")
-    asked = parser.parse_args()
+    asked = parser.parse_intermixed_args()
     asked.folder.mkdir(parents=True, exist_ok=True)
     print(f"{'scene':18s}            found   false  2 sigma            rms robust   mean   rest")
     for scene in asked.names or TROUBLES:

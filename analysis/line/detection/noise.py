@@ -56,6 +56,15 @@ class NoiseModel(Model):
         "line is asked of the positions.",
     )
 
+    spread: float = quantity(
+        1.0,
+        label="Spread of sums",
+        help="How much more a mean over neighbouring pixels scatters than if each had noise of its own: what is taken "
+        "for a line has to rise above that.",
+        ge=1,
+        le=10,
+    )
+
     filled_in: bool = quantity(
         False,
         label="Filled in",

@@ -8,13 +8,14 @@ from functools import partial
 import cv2
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 from scipy.special import ndtr
 
 from analysis.line.estimate import estimate_noise
 from analysis.line.extract import extract
 from analysis.line.result import Flag, Line
 from analysis.line.settings import ExtractionSettings
-from analysis.line.shared_noise import shared_noise, with_shared_noise
+from analysis.line.shared_noise import _covariance, shared_noise, with_shared_noise
 from render.sensor.processing import compressed, demosaiced
 
 ROWS, COLUMNS = 1024, 160
@@ -146,6 +147,41 @@ def test_a_rough_surface_is_told_by_a_sensor_of_independent_pixels() -> None:
     image = eight_bits(counted(11))
     assert not estimate_noise(image, ExtractionSettings()).alike
     assert estimate_noise(blurred(counted(11), 1.0), ExtractionSettings()).alike
+
+
+@pytest.mark.parametrize("blur", [0.0, 0.8, 2.0])
+def test_how_far_errors_are_alike_is_told_without_bias_and_to_a_few_tenths(blur: float) -> None:
+    """Errors blurred along a line of 512 scan lines: the variance of a mean over many of them is c_0 times the length.
+
+    A variance is known to sqrt(2 / n) by n that are independent, and so is a length by pairs of them: together by
+    sqrt(6 / n), to which the choice of the lags adds.
+    """
+    n, kernel = 512, np.zeros(101)
+    kernel[50] = 1.0
+    kernel = gaussian_filter1d(kernel, blur) if blur else kernel
+    length = kernel.sum() ** 2 / float(kernel @ kernel)
+    told = []
+    for seed in range(60):
+        white = np.random.default_rng(seed).normal(size=n + 100)
+        errors = np.convolve(white, kernel, "valid") / np.sqrt(kernel @ kernel)
+        found = _covariance(50.0 + 0.03 * np.arange(n) + 0.05 * errors, np.full(n, 0.05), np.full(n, SIGMA))
+        assert found is not None
+        told.append(float(found.covariance[0]) * found.length / length)
+    expected = math.sqrt(6.0 * length / n)
+    assert np.std(told) < 2.0 * expected
+    assert np.mean(told) == pytest.approx(1.0, abs=0.05 + 3.0 * np.std(told) / math.sqrt(60.0))
+
+
+def test_scan_lines_that_err_more_and_say_so_make_the_others_err_no_more_alike() -> None:
+    """Every third scan line errs by three times as much, independently: no distance has a covariance."""
+    told = np.where(np.arange(ROWS) % 3 == 0, 0.15, 0.05)
+    lengths = []
+    for seed in range(20):
+        u = centres() + told * np.random.default_rng(seed).normal(size=ROWS)
+        found = _covariance(u, told, np.full(ROWS, SIGMA))
+        assert found is not None and found.covariance[0] == pytest.approx(1.0, abs=4.0 * math.sqrt(2.0 / ROWS))
+        lengths.append(found.length)
+    assert np.median(lengths) < 1.1
 
 
 def test_too_few_scan_lines_say_nothing() -> None:

@@ -274,7 +274,7 @@ def test_the_overlay_shows_points_on_the_line_and_marks_what_has_none(tmp_path: 
     write(tmp_path / "a.png", image)
     told = answer(tmp_path / "a.png", "--overlay")["images"][0]
     drawn = cv2.imread(told["overlay"])
-    scale = 2
+    scale = 3
     green = (drawn[..., 1] > 200) & (drawn[..., 0] < 60) & (drawn[..., 2] < 60)
     rows, columns = np.nonzero(green[: scale * HEIGHT, : scale * 400])
     assert len(np.unique(rows)) == 200 and abs(np.median(columns) - scale * 170.5) < scale and rows.max() < scale * 201

@@ -76,7 +76,31 @@ def test_photographs_of_a_plane_get_a_report_with_residuals_as_large_as_sigma_sa
         assert fit["over_sigma"] == pytest.approx(1.0, abs=0.08 + 4.0 * 1.17 / np.sqrt(camera.height))
         assert fit["strays"] < 0.01
     page = re.sub(r'"data:image/png;base64,[^"]*"', '""', (tmp_path / "out" / "photo0_report.html").read_text())
+    assert "Nothing unusual." in page  # the surface is the shape, and sigma is true
     assert "http" not in page and "photo2.png" in page and "nan" not in page.lower()
     assert (tmp_path / "out" / "photo0_report.pdf").read_bytes().startswith(b"%PDF")
     again = CliRunner().invoke(main.cli, [*arguments, "--json", "--quiet", "--shape", "sphere", "--axis", "auto"])
     assert again.exit_code == 0, again.output  # its own files are replaced
+    page = (tmp_path / "out" / "photo0_report.html").read_text()
+    assert "lie beside its" not in page
+
+
+def test_a_surface_of_another_shape_is_told_as_worth_noticing(tmp_path: Path) -> None:
+    """A tenth of the line is on a ledge, and the third photograph is nowhere near where the project moves it to."""
+    project = Project.load(template_folder("plane") / "project.json")
+    scene = project.scene.scaled(0.25)
+    motion = LinearStage(moves="rig", step=(0.002, 0.0, 0.0), steps=3)
+    project.model_copy(update={"scene": scene.model_copy(update={"motion": motion})}).save(tmp_path / "rig.json")
+    camera, names = scene.camera, []
+    ledge = np.where(np.arange(camera.height) % camera.height < 0.1 * camera.height, 6.0, 0.0)
+    for k in range(3):
+        centre = 0.5 * camera.width + 0.02 * np.arange(camera.height) + ledge + (20.0 if k == 1 else 0.0)
+        electrons = exposed(expected(camera.width, centre, 3000, 1.5, 15.0), 3, np.random.default_rng(k))
+        names.append(str(tmp_path / f"photo{k}.png"))
+        cv2.imwrite(names[-1], np.round(electrons * 10).clip(0, 65535).astype(np.uint16))
+    arguments = ["reconstruct", *names, "--project", str(tmp_path / "rig.json"), "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(main.cli, [*arguments, "--quiet"])
+    assert done.exit_code == 0, done.output
+    page = (tmp_path / "out" / "photo0_report.html").read_text()
+    assert "Nothing unusual." not in page and "lie beside its straight line" in page
+    assert "times farther from one plane" in page
