@@ -77,29 +77,54 @@ def _determinant(r: float, c: float, s: float, k: Array, tilt: Array) -> float:
     return min(det, xx * c * c + (xy + yx) * c * s + yy * s * s)
 
 
+@numba.njit(nogil=True, error_model="numpy")
+def _determinants(r: float, c: Array, s: Array, k: Array, out: Array) -> None:
+    """As `_determinant` without a tilted sensor, in directions (n,) at one radius, which share the radial part."""
+    r2 = r * r
+    r4, r6 = r2 * r2, r2 * r2 * r2
+    bottom = 1.0 + k[5] * r2 + k[6] * r4 + k[7] * r6
+    radial = (1.0 + k[0] * r2 + k[1] * r4 + k[4] * r6) / bottom
+    dtop, dbottom = k[0] + 2.0 * k[1] * r2 + 3.0 * k[4] * r4, k[5] + 2.0 * k[6] * r2 + 3.0 * k[7] * r4
+    dradial = (dtop - radial * dbottom) / bottom
+    thin_x, thin_y = k[8] + 2.0 * k[9] * r2, k[10] + 2.0 * k[11] * r2
+    for i in range(len(c)):
+        x, y = r * c[i], r * s[i]
+        xx = radial + 2.0 * x * x * dradial + 2.0 * k[2] * y + 6.0 * k[3] * x + 2.0 * x * thin_x
+        xy = 2.0 * x * y * dradial + 2.0 * k[2] * x + 2.0 * k[3] * y + 2.0 * y * thin_x
+        yx = 2.0 * x * y * dradial + 2.0 * k[2] * x + 2.0 * k[3] * y + 2.0 * x * thin_y
+        yy = radial + 2.0 * y * y * dradial + 6.0 * k[2] * y + 2.0 * k[3] * x + 2.0 * y * thin_y
+        out[i] = min(xx * yy - xy * yx, xx * c[i] * c[i] + (xy + yx) * c[i] * s[i] + yy * s[i] * s[i])
+
+
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def fold_radii(k: Array) -> Array:
     """(14,) coefficients -> (720,) radius, by angle, up to which the map is one-to-one (at most 20, i.e. 87 deg)."""
-    folds = np.full(FOLD_ANGLES, MAX_RADIUS)
+    folds, folded = np.full(FOLD_ANGLES, MAX_RADIUS), np.zeros(FOLD_ANGLES, dtype=np.bool_)
     tilt = tilt_matrix(k[12], k[13])
     if not np.any(k):
         return folds
-    for i in range(FOLD_ANGLES):
-        c, s = math.cos(2.0 * math.pi * i / FOLD_ANGLES), math.sin(2.0 * math.pi * i / FOLD_ANGLES)
-        low, step = 0.0, 0.01
-        while low < MAX_RADIUS:
-            high = low + step
-            if not _determinant(high, c, s, k, tilt) > 0.0:
+    angle = 2.0 * math.pi * np.arange(FOLD_ANGLES) / FOLD_ANGLES
+    c, s, determinant = np.cos(angle), np.sin(angle), np.empty(FOLD_ANGLES)
+    radius, step = 0.0, 0.01
+    while radius < MAX_RADIUS and not folded.all():
+        beyond = radius + step
+        if k[12] == 0.0 and k[13] == 0.0:
+            _determinants(beyond, c, s, k, determinant)
+        else:
+            for i in range(FOLD_ANGLES):
+                determinant[i] = _determinant(beyond, c[i], s[i], k, tilt)
+        for i in range(FOLD_ANGLES):
+            if not folded[i] and not determinant[i] > 0.0:
+                low, high = radius, beyond
                 for _ in range(50):
                     middle = 0.5 * (low + high)
-                    if _determinant(middle, c, s, k, tilt) > 0.0:
+                    if _determinant(middle, c[i], s[i], k, tilt) > 0.0:
                         low = middle
                     else:
                         high = middle
-                folds[i] = low
-                break
-            low = high
-            step = min(step * 1.02, 0.1)
+                folds[i], folded[i] = low, True
+        radius = beyond
+        step = min(step * 1.02, 0.1)
     return folds
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import nnls
 
 from render.base.arrays import Float
 from render.base.errors import InputError
@@ -78,11 +78,11 @@ def fit_noise(
     value = (found.variance[good] - 1.0 / 12.0) / sigma
 
     def solved(free: list[int], value: Float) -> tuple[Float, Float]:
-        some = columns[:, free]
-        done = least_squares(lambda p: some @ p - value, np.full(len(free), 1e-6), bounds=(0.0, np.inf), x_scale="jac")
-        excess = max(2.0 * done.cost / max(len(value) - len(free), 1), 1.0)
+        size = np.linalg.norm(columns[:, free], axis=0)
+        best, left = nnls(columns[:, free] / size, value)
+        excess = max(left**2 / max(len(value) - len(free), 1), 1.0)
         p, spread = np.zeros(3), np.zeros(3)
-        p[free], spread[free] = done.x, np.sqrt(excess) * propagated(free, found.sigma)
+        p[free], spread[free] = best / size, np.sqrt(excess) * propagated(free, found.sigma)
         return p, spread
 
     def propagated(free: list[int], each: Float) -> Float:

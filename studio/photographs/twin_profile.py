@@ -104,8 +104,12 @@ def pixel_gaussian(distance: Float, sigma: Float | float) -> Float:
 def blurred_line(distance: Float, sigma: Float | float, blur: float) -> Float:
     """The same through the sensor's blur (px^2), which acts on pixels (Lindeberg's discrete Gaussian)."""
     reach = int(np.ceil(5.0 * np.sqrt(blur) + 3.0))
-    taps = ive(np.abs(np.arange(-reach, reach + 1)), blur)
-    return np.asarray(sum(tap * pixel_gaussian(distance - k + reach, sigma) for k, tap in enumerate(taps)))
+    found, above = np.zeros(np.broadcast(distance, sigma).shape), ndtr((distance + reach + 0.5) / sigma)
+    for k, tap in enumerate(ive(np.abs(np.arange(-reach, reach + 1)), blur)):
+        below = ndtr((distance + reach - k - 0.5) / sigma)
+        found += tap * (above - below)
+        above = below  # where one pixel ends the next begins
+    return found
 
 
 def expected(values: Float, part: Part, distance: Float) -> Float:

@@ -124,7 +124,8 @@ class Lines:
             mask = np.zeros(numbers.shape, np.uint8)
         else:
             mask = np.ascontiguousarray(numbers >= noise.saturation).view(np.uint8)
-        signal = (numbers - noise.black_level).astype(np.float32, copy=False)
+        # in order of its rows, whatever that of the image: kernels would be compiled anew for another
+        signal = np.subtract(numbers, noise.black_level, order="C").astype(np.float32, copy=False)
         signal *= np.float32(1.0 / noise.gain)
         bad = ~np.isfinite(signal)
         if bad.any():

@@ -70,13 +70,16 @@ def apply(choice: Choice) -> None:
         hints.setColorScheme(scheme)
     dark = choice == "dark" or (choice == "system" and hints.colorScheme() == Qt.ColorScheme.Dark)
     colours = DARK if dark else LIGHT
+    sheet = style_sheet(colours)
+    if app.styleSheet() == sheet and app.palette() == palette(colours):
+        return  # every widget that there is would be styled anew, those of a window in more than a second
     style = QStyleFactory.create("Fusion")
     if style is not None and app.style().name().lower() != "fusion":
         app.setStyle(style)
     app.setPalette(palette(colours))
     for kind in OUTLINED:
         app.setPalette(outlined(colours), kind)  # type: ignore[arg-type]  # takes no bytes, whatever its stub says
-    app.setStyleSheet(style_sheet(colours))
+    app.setStyleSheet(sheet)
     notice.changed.emit()
 
 

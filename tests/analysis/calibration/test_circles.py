@@ -36,10 +36,10 @@ def scene(tilt: float, side: float = 0.6, z: float = 0.6) -> Estimate:
 
 @functools.cache
 def rays_of(camera: tuple[float, ...], lens: tuple[float, ...]) -> np.ndarray:
-    """(512 FINE 640 FINE, 3) directions of the pixels' parts, of the camera that all scenes have."""
+    """(512 FINE, 2, 640 FINE) slopes of the rays of the pixels' parts, of the camera that all scenes have."""
     u, v = np.meshgrid(*((np.arange(n * FINE) + 0.5) / FINE - 0.5 for n in (WIDTH, HEIGHT)))
     q = normalise(np.column_stack([u.ravel(), v.ravel()]), np.array(camera), np.array(lens))
-    return np.column_stack([q, np.ones(len(q))])
+    return np.ascontiguousarray(q.reshape(*u.shape, 2).transpose(0, 2, 1))
 
 
 def photograph(there: Estimate, blur: float = 0.8) -> np.ndarray:
@@ -47,10 +47,15 @@ def photograph(there: Estimate, blur: float = 0.8) -> np.ndarray:
     u = (np.arange(WIDTH * FINE) + 0.5) / FINE - 0.5
     rays = rays_of(tuple(there.intrinsics), tuple(there.distortion))
     rotation, translation = there.rotation[0], there.translation[0]
-    depth = (rotation[:, 2] @ translation) / (rays @ rotation[:, 2])
-    place = (depth[:, None] * rays - translation) @ rotation[:, :2] / BOARD.square
-    nearest = np.clip(np.rint(place), 0, [BOARD.columns - 1, BOARD.rows - 1])
-    beyond = np.linalg.norm(place - nearest, axis=1).reshape(-1, len(u)) - BOARD.circle / BOARD.square
+    across, along, normal = rotation.T
+    beyond = np.empty((len(rays), len(u)))
+    for row, (x, y) in enumerate(rays):  # a row at a time stays in the processor's cache
+        depth = (normal @ translation) / (normal[0] * x + normal[1] * y + normal[2])
+        off = []
+        for axis, count in ((across, BOARD.columns), (along, BOARD.rows)):
+            place = (depth * (axis[0] * x + axis[1] * y + axis[2]) - axis @ translation) / BOARD.square
+            off.append(place - np.clip(np.rint(place), 0, count - 1))
+        beyond[row] = np.hypot(*off) - BOARD.circle / BOARD.square
     # of a part that the edge cuts the share on either side, to first order in its distance
     bright = np.clip(0.5 + beyond / np.hypot(*np.gradient(beyond)), 0.0, 1.0)
     image = cv2.GaussianBlur((50.0 + 130.0 * bright) * (1.0 + 2e-4 * u), (0, 0), blur * FINE)

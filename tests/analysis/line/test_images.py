@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from analysis.line.detection.channel import Lines
 from analysis.line.detection.noise import NoiseModel, image_saturation
 from analysis.line.estimate import estimate_noise
 from analysis.line.extract import extract
@@ -52,6 +53,17 @@ def test_columns_are_rows_of_the_transposed_image(method):
     pixels, index, _ = columns.pixels()
     assert np.array_equal(pixels[:, 0], index) and np.array_equal(pixels[:, 1], rows.u[index, 0])
     np.testing.assert_array_equal(rows.v[:, 0], np.arange(ROWS))
+
+
+@pytest.mark.parametrize("saturation", [None, 60000.0])
+@pytest.mark.parametrize("dtype", ["uint16", "float32", "float64"])
+@pytest.mark.parametrize("channel", ["mono", "red"])
+def test_kernels_find_columns_in_the_same_order_of_memory_as_rows(dtype, channel, saturation):
+    """Or all of them would be compiled anew for the first image that is read along columns."""
+    shape = (ROWS, WIDTH) if channel == "mono" else (ROWS, WIDTH, 3)
+    columns = np.full(shape, 100, dtype).swapaxes(0, 1)
+    lines = Lines(columns, channel, None, NoiseModel(gain=1.0, read_noise=3.0, saturation=saturation))
+    assert all(part.flags.c_contiguous for part in lines.read(0, WIDTH))
 
 
 def test_result_is_the_same_for_any_number_of_threads():

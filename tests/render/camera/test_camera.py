@@ -4,6 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from render.camera.camera import Camera
+from render.camera.distortion import FOLD_ANGLES, MAX_RADIUS, distort, fold_radii, tilt_matrix
 from tests.render.scenes import paper_camera
 
 COEFFICIENTS = (0.1, -0.2, 1e-3, 2e-3, 0.03, 0.1, 0.01, 2e-3, 1e-3, -2e-3, 3e-3, 1e-3, 0.02, -0.03)
@@ -60,6 +61,24 @@ def test_points_beyond_the_fold_have_no_image():
     # without the check this point would show up in the middle of the image, on the wrong side
     _, valid = camera.project(np.array([[1.58, 0.0, 1.0], [0.5, 0.0, 1.0], [0.0, 0.0, -1.0]]))
     assert valid.tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("terms", [1, 12, 14])
+def test_the_fold_is_the_first_radius_where_the_map_turns_back(terms):
+    k = np.zeros(14)
+    k[:terms] = (3.0 * np.array(COEFFICIENTS) - 0.4 * (np.arange(14) == 0))[:terms]
+    folds, tilt = fold_radii(k), tilt_matrix(k[12], k[13])
+    assert np.all(folds > 0.1) and np.any(folds < MAX_RADIUS)
+
+    def keeps_on(radius, angle):
+        c, s = np.cos(angle), np.sin(angle)
+        _, _, xx, xy, yx, yy = distort(radius * c, radius * s, k, tilt)
+        return xx * yy - xy * yx > 0.0 and xx * c * c + (xy + yx) * c * s + yy * s * s > 0.0
+
+    for i in range(0, FOLD_ANGLES, 31):
+        angle = 2.0 * np.pi * i / FOLD_ANGLES
+        assert all(keeps_on(share * folds[i], angle) for share in np.linspace(0.0, 1.0 - 1e-9, 60))
+        assert folds[i] == MAX_RADIUS or not keeps_on((1.0 + 1e-9) * folds[i], angle)
 
 
 def test_a_scaled_camera_sees_the_same_field():

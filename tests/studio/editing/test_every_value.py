@@ -49,7 +49,7 @@ def frame() -> RenderedFrame:
         "sensor.defocus": True,
         "sensor.speckle": "polarised",
     }
-    return render(scaled(project.replaced(changed), 0.1).in_folder(project.folder))
+    return render(scaled(project.replaced(changed), 0.05).in_folder(project.folder))
 
 
 def all_fields(project: Project, path: FieldPath) -> Iterator[tuple[FieldPath, FieldSpec]]:

@@ -26,6 +26,7 @@ def blurred() -> Project:
         "scene.rig.camera.lens.f_number": 1.4,
         "sensor.defocus": True,
         "render.truth_images": False,
+        "render.goal": None,
         "render.transport": "direct",
         "scene.lights": (),
     }
@@ -56,6 +57,7 @@ def test_a_frame_that_shall_have_no_truth_has_it_where_it_is_needed(blurred: Pro
     assert render(sharp(blurred)).truth is None
 
 
+@pytest.mark.usefixtures("quick_reports")
 @pytest.mark.parametrize("kept", ["all", "none"])
 def test_a_scan_without_the_truth_of_pixels_is_developed(blurred: Project, kept: str, tmp_path: Path) -> None:
     run_scan(blurred, blurred.folder, out=tmp_path / "out", options=ScanOptions(frames=kept))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QApplication
 
 from studio.qt.core import theme
 from studio.qt.core.theme import DARK, LIGHT, Colours
@@ -16,6 +17,19 @@ TEXT, OUTLINE = 4.5, 3.0
 def test_the_ratio_is_that_of_the_standard() -> None:
     assert contrast("#000000", "#ffffff") == pytest.approx(21.0)
     assert contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.01)
+
+
+def test_a_theme_that_holds_is_not_applied_again(qapp: QApplication) -> None:
+    """All widgets of a window were styled anew."""
+    theme.apply("light")
+    applied: list[str] = []
+    connection = theme.notice.changed.connect(lambda: applied.append(qapp.styleSheet()))
+    theme.apply("light")
+    assert not applied
+    qapp.setPalette(theme.palette(DARK))
+    theme.apply("light")
+    theme.notice.changed.disconnect(connection)
+    assert applied == [theme.style_sheet(LIGHT)] and theme.colours() == LIGHT
 
 
 @BOTH
