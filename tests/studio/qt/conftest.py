@@ -115,6 +115,19 @@ def no_thread_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
     assert not [thread.name for thread in left if thread.is_alive()]
 
 
+def leave_out_of_the_search() -> None:
+    """What there is lives to the end: each job ends with a search for garbage, which need not look at it again."""
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def what_a_module_leaves() -> Iterator[None]:
+    """Panels of the shared window above all, and what was imported and compiled for them."""
+    yield
+    leave_out_of_the_search()
+
+
 @pytest.fixture
 def small_project(tmp_path: Path) -> Path:
     """A file with the step block, seen in 244 x 204 px, so that a render takes a fraction of a second.
@@ -136,9 +149,7 @@ def small_project(tmp_path: Path) -> Path:
 def one_window(qapp: QApplication, tmp_path_factory: pytest.TempPathFactory) -> Iterator[MainWindow]:
     """Making a window takes a second: tests share one, and get it as if it were new."""
     made = new_window(tmp_path_factory.mktemp("desktop"), "plane")
-    # it lives to the end, as what was imported and compiled for it: the search for garbage after each job leaves it out
-    gc.collect()
-    gc.freeze()
+    leave_out_of_the_search()
     yield made
     made.files.count_as_saved(made.session.project)
     made.close()
