@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from analysis.line.result import Flag, Line
 from render.base.arrays import Float
+from render.base.few_values import quantile
 
 RUNS = (32, 64)
 """Scan lines in a run: the longer, if a cubic still follows the line there."""
@@ -249,9 +250,9 @@ def _run(u: Float, sigma: Float, width: Float, start: int) -> _Run | None:
     if there.sum() < FILLED * len(u):
         return None
     rest = _residual_maker(np.flatnonzero(there).tobytes(), len(u)) @ u[there]
-    scale, own = (1.4826 * _median(np.abs(one)) for one in (rest, rest / sigma[there]))
+    scale, own = (1.4826 * quantile(np.abs(one)) for one in (rest, rest / sigma[there]))
     there[there] = (np.abs(rest) <= STRAY * scale) | (np.abs(rest) <= STRAY * own * sigma[there])
-    if there.sum() < FILLED * len(u) or scale > JUMP * _median(width[there]):
+    if there.sum() < FILLED * len(u) or scale > JUMP * quantile(width[there]):
         return None
     rows, told = np.flatnonzero(there), sigma[there]
     # a cubic by the positions that know it best: by all alike, the noise of a few would be in the rest of all
@@ -264,12 +265,6 @@ def _run(u: Float, sigma: Float, width: Float, start: int) -> _Run | None:
     # sums over R T_j R o T_k of R = 1 - Q Q', Q the cubic's basis
     design = np.diag(lags.sum(axis=(1, 2))) - 2.0 * squares @ squares.T + inner @ inner.T
     return _Run((lags @ scaled) @ scaled, design, scaled**2, told**-2, start + rows)
-
-
-def _median(values: Float) -> float:
-    """Of a few values (n,), as `np.median`, which takes ten times as long for a run."""
-    ordered = np.sort(values)
-    return 0.5 * float(ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
 
 
 @lru_cache(maxsize=8)

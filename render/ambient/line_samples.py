@@ -129,7 +129,7 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
     Raises Cancelled.
     """
     lines = max(band.place.shape)
-    moves, guide, batches, spent = LineMoves(band.moves, band.line, lines), NO_GUIDE, count_from(0), 0
+    moves, guide, batches = LineMoves(band.moves, band.line, lines), NO_GUIDE, count_from(0)
 
     def add(count: Int, part: Run) -> None:
         sums, more = film.sums.copy(), count - film.done
@@ -149,7 +149,7 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
     for level in range(PASSES):
         count = _wanted(film, band, moves, run.threads)
         more = count - film.done
-        left, asked = max(most - film.total - spent, 0), more.sum(dtype=np.int64)
+        left, asked = max(most - film.total, 0), more.sum(dtype=np.int64)
         if asked > left:
             count = film.done + (more * (left / asked)).astype(np.int32)
         add(count, run.between(0.3, 1.0))
@@ -159,7 +159,6 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
             learned = _learn(film, paths, band, moves, [next(batches) for _ in range(ROUNDS)], run.between(0.3, 0.5))
             if learned is not None:
                 guide, anew = learned
-                spent = int(2 * ROUNDS * SAMPLES * np.count_nonzero(guide.row >= 0))
                 for part in range(1, AGAIN + 1):
                     add(np.maximum(film.done, anew * part // AGAIN), run.between(0.3, 1.0))
     return np.sqrt(known())
@@ -192,6 +191,7 @@ def _learn(
     weights = tuple(move[some] for move in band.moves)
     lines = GuidedPixels(band.pixels[some], band.keys[some], line, group.astype(np.int32), weights, heaviest)
     cumulative, worth = learned_guide(paths, lines, [batch * max(band.place.shape) for batch in batches], run)
+    film.apart += 2 * ROUNDS * SAMPLES * len(some)
     if not worth.any():
         return None
     some, group = some[worth[group][line]], group[line][worth[group][line]]

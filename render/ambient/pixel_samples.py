@@ -29,11 +29,13 @@ class PixelSamples:
         self.invalid_counts = np.zeros(2)
         self.cut = 0.0
         """Sum of what the clamp took of the samples."""
+        self.apart = 0
+        """Samples that are in no pixel: forgotten, or learned from."""
 
     @property
     def total(self) -> int:
         """Samples so far."""
-        return int(self.done.sum(dtype=np.int64))
+        return int(self.done.sum(dtype=np.int64)) + self.apart
 
     def extend(self, pixels: Int) -> None:
         """Take on more pixels, in any order."""
@@ -52,6 +54,7 @@ class PixelSamples:
     def forget(self, pixels: Int) -> None:
         """Leave out all samples of some pixels so far."""
         place = self.place(pixels)
+        self.apart += int(self.done[place].sum(dtype=np.int64))
         self.sums[place], self.spread[place], self.done[place] = 0.0, 0.0, 0
 
     def means(self, pixels: Int | None = None) -> Float32:

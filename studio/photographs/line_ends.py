@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from analysis.line.result import Flag, Line
+from render.base.few_values import quantile
 from studio.photographs.line_arrays import changed
 
 NEXT = 16
@@ -114,7 +115,7 @@ class _Found:
 
     def _usual(self, values: Floats, some: NDArray[np.intp]) -> float:
         # what is told by the wings of saturated peaks tends to be too much
-        return _quantile(values[some], 0.25 if self.saturated[some].any() else 0.5)
+        return quantile(values[some], 0.25 if self.saturated[some].any() else 0.5)
 
 
 def _scattered(found: _Found) -> NDArray[np.bool_]:
@@ -174,7 +175,7 @@ def _first(found: _Found, inward: NDArray[np.intp]) -> int:
         at, inside = inward[k], inward[k + 1 : k + 1 + NEXT]
         usual = min(found.usual_light(inside), _one_width_in(found, inside))
         bends = np.abs(np.diff(found.light[inside], 2))
-        scatter = 1.4826 * _quantile(bends) / 6.0**0.5 / max(usual, 1e-300)
+        scatter = 1.4826 * quantile(bends) / 6.0**0.5 / max(usual, 1e-300)
         asked = min(HALF * (1.0 + SURELY * scatter), 0.5 * (1.0 + HALF))
         there.append(alike(found.width[at], found.amplitude[at], found.width[inside], found.usual(inside)))
         on.append(there[-1] and _goes_on(found, at, inside))
@@ -191,7 +192,7 @@ def _one_width_in(found: _Found, inside: NDArray[np.intp]) -> float:
 
     What is brighter still beyond, as a glossy surface may be, tells nothing of the end.
     """
-    width = _quantile(found.width[inside])
+    width = quantile(found.width[inside])
     at = min(int(np.ceil(width)), len(inside)) - 1
     return found.usual_light(inside[max(at - at // 2, 0) : at + at // 2 + 1]) / ONE_WIDTH_IN
 
@@ -199,7 +200,7 @@ def _one_width_in(found: _Found, inside: NDArray[np.intp]) -> float:
 def _fades_from(found: _Found, inward: NDArray[np.intp], first: int) -> int:
     """The same from which scan line on a line fades, that has half of its light on the `first`; that, if it is blur."""
     inside = inward[first : first + NEXT]
-    usual, width = found.usual_light(inside), _quantile(found.width[inside])
+    usual, width = found.usual_light(inside), quantile(found.width[inside])
     start = first
     while start > 0:
         at = inward[start - 1]
@@ -215,24 +216,15 @@ def _goes_on(found: _Found, at: np.intp, inside: NDArray[np.intp]) -> bool:
     """Whether a scan line lies on a straight line through those that follow it."""
     inside = inside[: NEXT // 2]
     apart = (found.rows[inside] - found.rows[at]).astype(np.float64)
-    slope = _quantile(np.diff(found.u[inside]) / np.diff(apart))
+    slope = quantile(np.diff(found.u[inside]) / np.diff(apart))
     expected = found.u[inside] - slope * apart
-    middle = _quantile(expected)
-    scatter = 1.4826 * _quantile(np.abs(expected - middle))
-    allowed = max(ASIDE * _quantile(found.width[inside]), STRAY * scatter)
+    middle = quantile(expected)
+    scatter = 1.4826 * quantile(np.abs(expected - middle))
+    allowed = max(ASIDE * quantile(found.width[inside]), STRAY * scatter)
     return abs(float(found.u[at]) - middle) <= allowed
-
-
-def _quantile(values: Floats, share: float = 0.5) -> float:
-    """Of a few values (m,), as `np.quantile`, which takes 20 times as long for the 16 that an end is compared with."""
-    ordered = np.sort(values)
-    at = share * (len(ordered) - 1)
-    low = int(at)
-    high = min(low + 1, len(ordered) - 1)
-    return float((low + 1 - at) * ordered[low] + (at - low) * ordered[high])
 
 
 def alike(width: float, amplitude: float, widths: Floats, usual: float) -> bool:
     """Whether a width and an amplitude are those of a line whose scan lines (m,) have others, and a usual amplitude."""
-    typical = _quantile(widths)
+    typical = quantile(widths)
     return amplitude >= HALF * usual and typical / WIDER <= width <= WIDER * typical

@@ -123,8 +123,6 @@ def run_scan(
             foreseen = with_foretold(foreseen, scan.plan.foretold, count)
         listener.foreseen(foreseen)
         _take_frames(scan, first, count, written, measuring)
-        if count > 1:
-            return_what_is_free()  # so that what the points and the report take comes in place of what frames took
         result: dict[str, Any] = {
             "name": project.name,
             "created": now(),
@@ -204,6 +202,8 @@ def _take_frames(scan: Scan, first: World, count: int, written: Written, measuri
     """
     try:
         _take_each(scan, first, count, written, measuring)
+        if count > 1:
+            return_what_is_free()  # so that what the points and the report take comes in place of what frames took
     except (Cancelled, KeyboardInterrupt):
         if scan.options.frames != "none" or measuring is None:
             raise

@@ -57,6 +57,14 @@ def paths_of(scene, world, seed):
     return camera_paths(world, scene, scene.camera.view(scene.T_world_camera()), surfaces=3, seed=seed)
 
 
+def light_of(paths, pixels, draws, samples):
+    """(n, 3) mean over so many samples of both halves of each pixel."""
+    film, first = Film(np.zeros((2 * len(pixels), 4)), np.zeros(2)), np.zeros((len(pixels), 2), np.int32)
+    paths.add(pixels, first, first + samples, film, None, draws)
+    assert film.counts[0] == 0
+    return film.sums[:, :3].reshape(-1, 2, 3).sum(axis=1) / (2 * samples)
+
+
 @pytest.mark.parametrize(
     "material",
     [Lambertian(albedo=(0.7, 0.5, 0.3)), Conductor(metal="steel", roughness=0.3), Coated(albedo=(0.5, 0.4, 0.3))],
@@ -71,11 +79,7 @@ def test_no_image_is_wrong_by_a_guide_whatever_it_has_learned(material):
     for draws in (Draws(pixels), Draws(pixels, guide)):
         found = []
         for seed in range(12):
-            film = Film(np.zeros((2 * len(pixels), 4)), np.zeros(2))
-            first = np.zeros((len(pixels), 2), np.int32)
-            paths_of(scene, world, seed + 100 * len(means)).add(pixels, first, first + samples, film, None, draws)
-            assert film.counts[0] == 0
-            light = film.sums[:, :3].reshape(-1, 2, 3).sum(axis=1) / (2 * samples)
+            light = light_of(paths_of(scene, world, seed + 100 * len(means)), pixels, draws, samples)
             # guided pixels, and those beside them that are not
             found.append(np.concatenate([light[row >= 0].mean(axis=0), light[row < 0].mean(axis=0)]))
         means.append(np.array(found))
@@ -109,10 +113,7 @@ def test_what_is_learned_of_a_bright_patch_makes_its_lines_scatter_less():
     for draws in (Draws(pixels), Draws(pixels, guide)):
         found = []
         for seed in range(24):
-            film = Film(np.zeros((2 * len(pixels), 4)), np.zeros(2))
-            first = np.zeros((len(pixels), 2), np.int32)
-            paths_of(scene, world, seed).add(pixels, first, first + 32, film, None, draws)
-            found.append(film.sums[:, :3].sum() / 64)
+            found.append(light_of(paths_of(scene, world, seed), pixels, draws, 32).sum())
         spread.append((np.mean(found), np.std(found, ddof=1)))
     (plain, by_chance), (guided, led) = spread
     assert abs(plain - guided) < 4.5 * np.hypot(by_chance, led) / np.sqrt(24.0)
